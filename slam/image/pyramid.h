@@ -1,0 +1,46 @@
+// Scale pyramid of a grey image, in memory allocated once.
+#pragma once
+
+#include <memory>
+
+#include "slam/image/feature.h"
+
+namespace farpoint::slam {
+
+struct PyramidOptions {
+  int levels = 8;
+  double scale_factor = 1.2;    // size ratio of neighbouring levels
+};
+
+// All levels of one image. Level l has size round(size / scale^l). Level 0 is a copy of the input (the input belongs to
+// a driver). Allocation happens in the constructor only.
+class Pyramid {
+ public:
+  Pyramid(int width_px, int height_px, const PyramidOptions& options);
+  // Fills every level. The image must have the constructor's size (asserted; callers check before).
+  void build(const ImageView& image);
+
+  [[nodiscard]] int levels() const;
+  [[nodiscard]] ImageView level(int l) const;
+  [[nodiscard]] float scale(int l) const;    // level-0 pixels a pixel of level l
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Storage;
+  std::shared_ptr<Storage> storage_;
+};
+
+// FrameImage on a pyramid; the pyramid must outlive it.
+class PyramidImage final : public FrameImage {
+ public:
+  PyramidImage() = default;
+  explicit PyramidImage(const Pyramid* pyramid) : pyramid_(pyramid) {}
+  [[nodiscard]] bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const override;
+  [[nodiscard]] Alignment align(const Patch& host, const Eigen::Matrix2f& A_target_host,
+                                const Eigen::Vector2f& predicted_px, float max_shift_px) const override;
+
+ private:
+  const Pyramid* pyramid_ = nullptr;
+};
+
+}  // namespace farpoint::slam

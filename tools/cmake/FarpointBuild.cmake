@@ -1,0 +1,54 @@
+# Flags and small functions used by every folder.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+# Programs of every folder land in one place, so that a build folder holds exactly one of each.
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+# One instruction set for the whole program, the platform's baseline: Eigen's alignment must match Debian's
+# Ceres. SIMD beyond it lives in the kernels and is chosen at run time by Highway. No contraction into FMA, so
+# that the same source gives the same bits on every compiler setting.
+add_compile_options(-ffp-contract=off)
+set(FARPOINT_WARNINGS -Wall -Wextra -Wconversion -Werror)
+
+set(FARPOINT_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
+if(FARPOINT_SANITIZE)
+  add_compile_options(-fsanitize=${FARPOINT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${FARPOINT_SANITIZE})
+endif()
+
+# farpoint_library(name): every *.cc of the current folder and below becomes a static library.
+function(farpoint_library name)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cc)
+  list(FILTER sources EXCLUDE REGEX "_main\\.cc$")
+  add_library(${name} STATIC ${sources})
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  target_compile_options(${name} PRIVATE ${FARPOINT_WARNINGS})
+endfunction()
+
+# farpoint_test(name folder libraries...): one GoogleTest program from tests/<folder>/*.cc, one ctest entry a test.
+function(farpoint_test name folder)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/${folder}/*.cc)
+  if(NOT sources)
+    return()
+  endif()
+  add_executable(${name} ${sources})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
+  target_compile_options(${name} PRIVATE ${FARPOINT_WARNINGS})
+  target_compile_definitions(${name} PRIVATE FARPOINT_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+                             FARPOINT_BINARY_DIR="${CMAKE_BINARY_DIR}")
+  target_link_libraries(${name} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${folder} TIMEOUT 600)
+endfunction()
