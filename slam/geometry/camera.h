@@ -58,6 +58,7 @@ class Camera {
  private:
   Parameters p_;
   double max_theta_rad_ = 0.0;    // beyond this angle from the optical axis nothing projects
+  double max_radius_ = 0.0;       // radtan: tan(max_theta_rad_); Kannala-Brandt: theta_d(max_theta_rad_)
 };
 
 }  // namespace farpoint::slam
