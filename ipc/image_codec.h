@@ -14,22 +14,22 @@ namespace farpoint::ipc {
 // Rows without gaps, row by row from the top.
 struct GreyImage {
   int width_px = 0, height_px = 0;
-  std::vector<std::uint8_t> pixels;    // width_px * height_px
+  std::vector<std::uint8_t> pixels;  // width_px * height_px
 
   [[nodiscard]] const std::uint8_t* data() const { return pixels.data(); }
 };
 
 enum class ImageStatus : std::uint8_t {
   kOk,
-  kWrongSize,       // the bytes hold an image of another size than the message says, or too few bytes of grey
-  kUnknownFormat,   // a pixel format that is not image_t's
-  kDamaged,         // the JPEG or PNG cannot be decoded in full
+  kWrongSize,      // the bytes hold an image of another size than the message says, or too few bytes of grey
+  kUnknownFormat,  // a pixel format that is not image_t's
+  kDamaged,        // the JPEG or PNG cannot be decoded in full
 };
 [[nodiscard]] const char* to_string(ImageStatus status);
 
 // What an image file's head says.
 struct ImageInfo {
-  std::int32_t pixel_format = 0;       // image_t::PIXEL_FORMAT_MJPEG or PIXEL_FORMAT_PNG
+  std::int32_t pixel_format = 0;  // image_t::PIXEL_FORMAT_MJPEG or PIXEL_FORMAT_PNG
   int width_px = 0, height_px = 0;
 };
 // Reads the head of a JPEG or PNG file. Empty where it is neither or is cut off before its size.
@@ -45,8 +45,8 @@ class ImageDecoder {
   ImageDecoder(const ImageDecoder&) = delete;
   ImageDecoder& operator=(const ImageDecoder&) = delete;
 
-  // Decodes message.data (its first message.size bytes). Colour becomes luma, 16 bit becomes 8. On any status but kOk
-  // the image's content is unspecified.
+  // Decodes message.data (its first message.size bytes). Colour becomes luma, 16 bit becomes 8. On any status
+  // but kOk the image's content is unspecified.
   [[nodiscard]] ImageStatus decode(const image_t& message, GreyImage* image);
 
  private:

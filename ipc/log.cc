@@ -21,9 +21,13 @@ std::uint64_t big_endian(const std::uint8_t* bytes, int count) {
   return value;
 }
 
-bool is_sync(const std::uint8_t* bytes) { return big_endian(bytes, 4) == LogReader::kSyncWord; }
+bool is_sync(const std::uint8_t* bytes) {
+  return big_endian(bytes, 4) == LogReader::kSyncWord;
+}
 
-bool is_printable(std::uint8_t c) { return c > 0x20 && c < 0x7f; }
+bool is_printable(std::uint8_t c) {
+  return c > 0x20 && c < 0x7f;
+}
 
 int open_log(const std::string& path) {
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -81,7 +85,8 @@ bool LogReader::read_header(std::size_t ahead, Header* header) {
   header->channel_bytes = big_endian(field + 20, 4);
   header->data_bytes = big_endian(field + 24, 4);
   if (header->channel_bytes == 0 || header->channel_bytes > kMaxChannelBytes) return false;
-  if (header->data_bytes > kMaxDataBytes || !available(ahead + kHeaderBytes + header->channel_bytes)) return false;
+  if (header->data_bytes > kMaxDataBytes || !available(ahead + kHeaderBytes + header->channel_bytes))
+    return false;
   const std::uint8_t* name = here() + ahead + kHeaderBytes;
   return std::all_of(name, name + header->channel_bytes, is_printable);
 }
@@ -98,8 +103,8 @@ bool LogReader::header_within(std::size_t from, std::size_t to) {
   return false;
 }
 
-// True where a whole event stands here. Where nothing that is a log follows it, either its own lengths are damaged (then
-// the next event's header lies within its data) or what follows is.
+// True where a whole event stands here. Where nothing that is a log follows it, either its own lengths are
+// damaged (then the next event's header lies within its data) or what follows is.
 bool LogReader::whole_event_here(Header* header) {
   if (!read_header(0, header)) return false;
   const std::size_t bytes = header->event_bytes();
@@ -126,7 +131,7 @@ void LogReader::skip_to_sync() {
                           : static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - here()));
     if (found != nullptr && !available(kSyncBytes)) break;
   }
-  if (end_ - begin_ < kSyncBytes) skip(end_ - begin_);   // too few bytes left for anything
+  if (end_ - begin_ < kSyncBytes) skip(end_ - begin_);  // too few bytes left for anything
   damage_.bytes += offset_ - start;
   damage_end_ = offset_;
 }
@@ -154,14 +159,16 @@ bool LogReader::next(LogEvent* event) {
 
 LogWriter::LogWriter(const std::string& path) : path_(path) {
   log_ = lcm_eventlog_create(path_.writable().c_str(), "w");
-  if (log_ == nullptr) throw std::runtime_error("cannot write log " + path_.target() + ": " + std::strerror(errno));
+  if (log_ == nullptr)
+    throw std::runtime_error("cannot write log " + path_.target() + ": " + std::strerror(errno));
 }
 
 LogWriter::~LogWriter() {
   if (log_ != nullptr) lcm_eventlog_destroy(log_);
 }
 
-bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us, std::span<const std::uint8_t> data) {
+bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us,
+                      std::span<const std::uint8_t> data) {
   if (!error_.empty() || log_ == nullptr) return false;
   channel_ = channel;
   lcm_eventlog_event_t event{};
@@ -169,7 +176,7 @@ bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us, std::
   event.channellen = static_cast<std::int32_t>(channel_.size());
   event.datalen = static_cast<std::int32_t>(data.size());
   event.channel = channel_.data();
-  event.data = const_cast<std::uint8_t*>(data.data());   // LCM's API is not const; it only reads
+  event.data = const_cast<std::uint8_t*>(data.data());  // LCM's API is not const; it only reads
   if (lcm_eventlog_write_event(log_, &event) != 0) {
     error_ = std::strerror(errno);
     return false;

@@ -1,8 +1,9 @@
 // LCM logs: reading that survives damage, writing that leaves a whole file or none.
 //
-// Event format (LCM's, big-endian): sync word 0xEDA1DA01, event number (8 bytes), receive time in us (8), length of
-// the channel name (4), length of the data (4), name, data. LCM's own reader asserts on damaged lengths and cannot
-// read a pipe, so the reader here is our own; a test shows that both agree on an intact log. Writing uses LCM's.
+// Event format (LCM's, big-endian): sync word 0xEDA1DA01, event number (8 bytes), receive time in us (8),
+// length of the channel name (4), length of the data (4), name, data. LCM's own reader asserts on damaged
+// lengths and cannot read a pipe, so the reader here is our own; a test shows that both agree on an intact
+// log. Writing uses LCM's.
 #pragma once
 
 #include <lcm/eventlog.h>
@@ -20,19 +21,19 @@ namespace farpoint::ipc {
 
 // One event. Views are valid until the reader's next call.
 struct LogEvent {
-  std::int64_t number = 0;             // as written; not necessarily consecutive after damage
-  std::int64_t timestamp_us = 0;       // when it was received; a frame's time is its message's utime instead
-  std::uint64_t offset = 0;            // of the sync word in the file, bytes
+  std::int64_t number = 0;        // as written; not necessarily consecutive after damage
+  std::int64_t timestamp_us = 0;  // when it was received; a frame's time is its message's utime instead
+  std::uint64_t offset = 0;       // of the sync word in the file, bytes
   std::string_view channel;
   std::span<const std::uint8_t> data;
 };
 
 // What could not be read.
 struct LogDamage {
-  std::uint64_t places = 0;            // connected stretches that were skipped, a cut-off end included
-  std::uint64_t bytes = 0;             // skipped in all
-  std::uint64_t first_offset = 0;      // of the first place
-  std::string read_error;              // errno's text where the disk or pipe itself failed, else empty
+  std::uint64_t places = 0;        // connected stretches that were skipped, a cut-off end included
+  std::uint64_t bytes = 0;         // skipped in all
+  std::uint64_t first_offset = 0;  // of the first place
+  std::string read_error;          // errno's text where the disk or pipe itself failed, else empty
 };
 
 class LogReader {
@@ -47,7 +48,7 @@ class LogReader {
   [[nodiscard]] bool next(LogEvent* event);
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
-  [[nodiscard]] std::uint64_t events() const { return events_; }   // given out so far
+  [[nodiscard]] std::uint64_t events() const { return events_; }  // given out so far
 
   static constexpr std::uint32_t kSyncWord = 0xEDA1DA01;
   static constexpr std::size_t kHeaderBytes = 28;
@@ -68,12 +69,12 @@ class LogReader {
 
   int fd_ = -1;
   bool owns_fd_ = false;
-  bool at_end_ = false;                 // nothing more to read from fd_
+  bool at_end_ = false;  // nothing more to read from fd_
   std::vector<std::uint8_t> buffer_;
-  std::size_t begin_ = 0, end_ = 0;     // unread bytes within buffer_
-  std::size_t consumed_ = 0;            // of the event given out last
-  std::uint64_t offset_ = 0;            // of begin_ in the file
-  std::uint64_t damage_end_ = 0;        // where the last damaged stretch ended
+  std::size_t begin_ = 0, end_ = 0;  // unread bytes within buffer_
+  std::size_t consumed_ = 0;         // of the event given out last
+  std::uint64_t offset_ = 0;         // of begin_ in the file
+  std::uint64_t damage_end_ = 0;     // where the last damaged stretch ended
   std::uint64_t events_ = 0;
   LogDamage damage_;
 };
@@ -96,8 +97,8 @@ class LogWriter {
     return write(channel, timestamp_us, scratch_);
   }
 
-  // Flushes, and puts the file in its place. Throws std::runtime_error where anything was not stored (disk full): the
-  // target is then as it was before.
+  // Flushes, and puts the file in its place. Throws std::runtime_error where anything was not stored (disk
+  // full): the target is then as it was before.
   void close();
 
   [[nodiscard]] const std::string& error() const { return error_; }

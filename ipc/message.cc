@@ -36,7 +36,9 @@ class Walker {
   std::span<const std::uint8_t> bytes_;
 };
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
 
 std::size_t take_number(std::string_view* layout) {
   std::size_t value = 0;
@@ -59,17 +61,17 @@ std::size_t bracket_length(std::string_view layout) {
 
 bool Walker::take_string() {
   std::size_t length = 0;
-  if (!take_length(&length) || length == 0 || length > bytes_.size()) return false;   // the NUL is counted
+  if (!take_length(&length) || length == 0 || length > bytes_.size()) return false;  // the NUL is counted
   return take(length);
 }
 
 bool Walker::take_array(std::size_t count, std::string_view items) {
   std::string_view rest = items;
   const std::size_t element_bytes = take_number(&rest);
-  if (rest.empty() && element_bytes > 0) {   // numbers only: no loop
+  if (rest.empty() && element_bytes > 0) {  // numbers only: no loop
     return count <= bytes_.size() / element_bytes && take(count * element_bytes);
   }
-  if (count > bytes_.size()) return false;   // every element has a byte at least
+  if (count > bytes_.size()) return false;  // every element has a byte at least
   for (std::size_t i = 0; i < count; ++i) {
     if (!walk(items)) return false;
   }
@@ -93,7 +95,7 @@ bool Walker::walk(std::string_view layout) {
       std::string_view content = layout.substr(0, length);
       layout.remove_prefix(length + 1);
       const std::size_t which = take_number(&content);
-      content.remove_prefix(1);   // ':'
+      content.remove_prefix(1);  // ':'
       if (which >= known || !take_array(counts[which], content)) return false;
     }
   }

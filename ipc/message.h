@@ -1,8 +1,9 @@
 // LCM messages from and to bytes.
 //
-// lcm-gen's decoders trust counts and string lengths: a damaged one makes them allocate gigabytes or read beyond the
-// buffer. decode() therefore walks the bytes first, along the type's layout, and lets the generated code only see
-// messages whose every length fits. A test derives the layouts anew from ipc/types/*.lcm.
+// lcm-gen's decoders trust counts and string lengths: a damaged one makes them allocate gigabytes or read
+// beyond the buffer. decode() therefore walks the bytes first, along the type's layout, and lets the
+// generated code only see messages whose every length fits. A test derives the layouts anew from
+// ipc/types/*.lcm.
 #pragma once
 
 #include <cstdint>
@@ -34,28 +35,40 @@ namespace farpoint::ipc {
 //   #               an int32 that counts a later array; they are numbered from 0 within their struct
 //   [n:items]       an array of as many `items` as count number n says
 template <typename Message>
-inline constexpr std::string_view kLayout = {};   // empty: not a type that decode() takes
-template <> inline constexpr std::string_view kLayout<calibration_t> = "8s#[0:ss8 32 40 56 16]1 24 32 40";
-template <> inline constexpr std::string_view kLayout<ground_truth_t> = "8 24 1 32";
-template <> inline constexpr std::string_view kLayout<image_t> = "16 12 4 12 4#[0:1]";
-template <> inline constexpr std::string_view kLayout<imu_t> = "8 24 24 8";
-template <> inline constexpr std::string_view kLayout<map_from_odom_t> = "8 4 24 32 8 1 4";
-template <> inline constexpr std::string_view kLayout<map_t> =
-    "8 4 1#[0:4][0:4][0:4][0:4][0:1][0:1]#[1:8][1:56]";
-template <> inline constexpr std::string_view kLayout<odometry_t> = "24 24 32 24 24 288 288 6 8";
-template <> inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
-template <> inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 40 64 24 16 8 24 8 ssss";
-template <> inline constexpr std::string_view kLayout<summary_t> =
+inline constexpr std::string_view kLayout = {};  // empty: not a type that decode() takes
+template <>
+inline constexpr std::string_view kLayout<calibration_t> = "8s#[0:ss8 32 40 56 16]1 24 32 40";
+template <>
+inline constexpr std::string_view kLayout<ground_truth_t> = "8 24 1 32";
+template <>
+inline constexpr std::string_view kLayout<image_t> = "16 12 4 12 4#[0:1]";
+template <>
+inline constexpr std::string_view kLayout<imu_t> = "8 24 24 8";
+template <>
+inline constexpr std::string_view kLayout<map_from_odom_t> = "8 4 24 32 8 1 4";
+template <>
+inline constexpr std::string_view kLayout<map_t> = "8 4 1#[0:4][0:4][0:4][0:4][0:1][0:1]#[1:8][1:56]";
+template <>
+inline constexpr std::string_view kLayout<odometry_t> = "24 24 32 24 24 288 288 6 8";
+template <>
+inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
+template <>
+inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 40 64 24 16 8 24 8 ssss";
+template <>
+inline constexpr std::string_view kLayout<summary_t> =
     "8 2 8 s 128 12 8 4 40 #[0: 4 8 12 24 #[0:4][0:4][0:1] 8 24 #[1:4]] ssss";
-template <> inline constexpr std::string_view kLayout<timing_t> = "16 128 128 16 1 24";
-template <> inline constexpr std::string_view kLayout<trajectory_t> = "8 8 1 8 #[0: 12 24 32 2]";
-template <> inline constexpr std::string_view kLayout<wheels_t> = "8 32 #[0:8]";
+template <>
+inline constexpr std::string_view kLayout<timing_t> = "16 128 128 16 1 24";
+template <>
+inline constexpr std::string_view kLayout<trajectory_t> = "8 8 1 8 #[0: 12 24 32 2]";
+template <>
+inline constexpr std::string_view kLayout<wheels_t> = "8 32 #[0:8]";
 
 // True where the bytes are exactly as long as the layout says, every count and length included.
 [[nodiscard]] bool fits_layout(std::span<const std::uint8_t> bytes, std::string_view layout);
 
-// True where `data` (with the leading fingerprint) is one whole message of this type. On false the message's content
-// is unspecified. Arrays of a reused message may be longer than their count: use the count.
+// True where `data` (with the leading fingerprint) is one whole message of this type. On false the message's
+// content is unspecified. Arrays of a reused message may be longer than their count: use the count.
 template <typename Message>
 [[nodiscard]] bool decode(std::span<const std::uint8_t> data, Message* message) {
   static_assert(!kLayout<Message>.empty(), "give this type a layout");

@@ -1,4 +1,5 @@
-// Files that appear whole or not at all: written under a temporary name beside the target, renamed at the end.
+// Files that appear whole or not at all: written under a temporary name beside the target, renamed at the
+// end.
 #pragma once
 
 #include <cstdio>
@@ -6,9 +7,9 @@
 
 namespace farpoint::ipc {
 
-// A target path and the temporary path to write meanwhile. commit() renames; a destructor without commit() removes
-// the temporary and leaves an existing target as it was. Devices and pipes are written directly; "-" is standard
-// output.
+// A target path and the temporary path to write meanwhile. commit() renames; a destructor without commit()
+// removes the temporary and leaves an existing target as it was. Devices and pipes are written directly; "-"
+// is standard output.
 class ReplacedPath {
  public:
   // Throws std::runtime_error where the target's folder does not exist or the target is a folder.
@@ -18,7 +19,7 @@ class ReplacedPath {
   ReplacedPath& operator=(const ReplacedPath&) = delete;
 
   [[nodiscard]] const std::string& target() const { return target_; }
-  [[nodiscard]] const std::string& writable() const { return writable_; }   // open this one
+  [[nodiscard]] const std::string& writable() const { return writable_; }  // open this one
   // Throws std::runtime_error where the rename fails.
   void commit();
 
@@ -30,14 +31,14 @@ class ReplacedPath {
 // A stream into a ReplacedPath.
 class OutputFile {
  public:
-  explicit OutputFile(std::string target);   // throws std::runtime_error
-  ~OutputFile();                             // without close(): nothing is left behind
+  explicit OutputFile(std::string target);  // throws std::runtime_error
+  ~OutputFile();                            // without close(): nothing is left behind
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
   [[nodiscard]] std::FILE* stream() { return stream_; }
-  // Flushes to the disk and renames. Throws std::runtime_error naming the file where anything written so far was not
-  // stored (disk full); the target is then left as it was.
+  // Flushes to the disk and renames. Throws std::runtime_error naming the file where anything written so far
+  // was not stored (disk full); the target is then left as it was.
   void close();
 
  private:
