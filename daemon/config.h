@@ -1,0 +1,99 @@
+// The daemon's configuration: farpoint.yaml and --set, checked key by key.
+//
+// One table (config_keys()) knows every key: name, type, unit, range, and the field it fills. Parsing, checking, the
+// canonical text, its hash and the test that config/farpoint.yaml tells the truth are all driven by it, so a new key is
+// one line in config_keys.cc and one entry in config/farpoint.yaml.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ipc/channels.h"
+#include "slam/config.h"
+
+namespace farpoint::daemon {
+
+struct LogConfig {
+  std::string level = "info";
+};
+
+struct CameraConfig {
+  int index = 0;    // which camera of the log, and of its calibration, is tracked
+};
+
+struct ScaleConfig {
+  double assumed = 0.0;    // metres a map unit; 0: unknown
+};
+
+struct LcmConfig {
+  std::string url = ipc::kDefaultLcmUrl;
+  double status_rate_hz = 5.0;
+  double map_rate_hz = 1.0;
+  int map_points = 2000;
+};
+
+struct CanConfig {
+  std::string interface = "can0";
+};
+
+struct Config {
+  LogConfig log;
+  CameraConfig camera;
+  ScaleConfig scale;
+  LcmConfig lcm;
+  CanConfig can;
+  slam::EstimatorConfig estimator;
+};
+
+// What a user did wrong: what() is one line with place, key, value and what was expected.
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+enum class KeyType { kInteger, kNumber, kText, kChoice };
+
+// One key of the configuration.
+struct ConfigKey {
+  std::string name;    // dotted: section.key
+  KeyType type = KeyType::kInteger;
+  std::string unit;              // "px", "frames", ...; empty where the value has none
+  double min = 0.0, max = 0.0;   // inclusive; numbers only
+  std::vector<std::string> choices;
+  // Canonical text of the value: a number's shortest form that reads back to the same bits.
+  std::function<std::string(const Config&)> get;
+  // Stores a value that was checked; numbers come as text that parses.
+  std::function<void(Config&, const std::string&)> set;
+};
+
+// All keys in the order of config/farpoint.yaml.
+[[nodiscard]] std::span<const ConfigKey> config_keys();
+// "an integer from 1 to 100 (px)".
+[[nodiscard]] std::string expectation(const ConfigKey& key);
+// "[px; 1 to 100; default 15]": the line that config/farpoint.yaml carries above the key.
+[[nodiscard]] std::string documentation_line(const ConfigKey& key);
+
+// Where each key was last set ("FILE:LINE" or "--set"); a key that is missing has its built-in default.
+using ConfigOrigins = std::map<std::string, std::string>;
+
+// Reads a YAML file, or text that stands for it, over *config. Throws ConfigError.
+void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins);
+void load_config_text(const std::string& text, const std::string& file_name, Config* config, ConfigOrigins* origins);
+// Applies one "dotted.key=value" of the command line. Throws ConfigError.
+void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins);
+// Checks what concerns more than one key. Throws ConfigError.
+void check_relations(const Config& config, const ConfigOrigins& origins);
+
+// Every key as YAML, in table order and in one spelling: equal texts mean equal configurations, and
+// load_config_text() reads it back.
+[[nodiscard]] std::string canonical_text(const Config& config);
+// FNV-1a, 64 bit, of the canonical text.
+[[nodiscard]] std::uint64_t config_hash(const Config& config);
+[[nodiscard]] std::uint64_t fnv1a_64(const std::string& text);
+
+}  // namespace farpoint::daemon
