@@ -1,0 +1,49 @@
+// YAML files read strictly: every complaint names file and line.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "slam/geometry/se3.h"
+
+namespace farpoint::tools {
+
+class YamlFile {
+ public:
+  // Throws InputError where the file cannot be read, is no YAML, or its top is no map.
+  explicit YamlFile(std::filesystem::path file);
+
+  [[nodiscard]] const YAML::Node& root() const { return root_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  // All of these throw InputError; `key` is a key of the top map.
+  [[nodiscard]] bool has(const std::string& key) const { return root_[key].IsDefined(); }
+  [[nodiscard]] YAML::Node require(const std::string& key) const;
+  [[nodiscard]] std::string text(const std::string& key) const;
+  [[nodiscard]] double number(const std::string& key) const;
+  [[nodiscard]] double number_or(const std::string& key, double fallback) const;
+  [[nodiscard]] int integer(const std::string& key) const;
+  // A list of finite numbers, of one of the given lengths.
+  [[nodiscard]] std::vector<double> numbers(const std::string& key, const std::vector<std::size_t>& lengths) const;
+  // 16 numbers by rows into a rigid motion; `name` is for the error.
+  [[nodiscard]] slam::SE3 rigid_motion(const YAML::Node& list, const std::string& name) const;
+  // Fails for a key that is none of these.
+  void allow_only(const std::vector<std::string>& keys) const;
+
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& message) const;
+
+ private:
+  [[nodiscard]] double finite_number(const YAML::Node& node, const std::string& name) const;
+
+  std::filesystem::path path_;
+  YAML::Node root_;
+};
+
+// Nearest rigid motion of a 3x3 or 3x4 matrix by rows where it is one to `tolerance`; false elsewhere.
+[[nodiscard]] bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motion);
+
+}  // namespace farpoint::tools

@@ -1,0 +1,52 @@
+#include "tools/import/camera_file.h"
+
+#include "tools/common/errors.h"
+#include "tools/common/yaml_file.h"
+
+namespace farpoint::tools {
+namespace {
+
+constexpr double kMaxRowTime_s = 1e-3;   // 1 ms a row is half a second an image: certainly another unit
+
+slam::CameraModel read_model(const YamlFile& yaml) {
+  const std::string model = yaml.text("model");
+  if (model == "pinhole-radtan") return slam::CameraModel::kPinholeRadtan;
+  if (model == "kannala-brandt") return slam::CameraModel::kKannalaBrandt;
+  yaml.fail(yaml.require("model"), "expected model 'pinhole-radtan' or 'kannala-brandt', found '" + model + "'");
+}
+
+}  // namespace
+
+CameraFile read_camera_file(const std::filesystem::path& file) {
+  const YamlFile yaml(file);
+  yaml.allow_only({"model", "width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
+                   "T_body_camera", "rate_hz", "row_time_s"});
+  CameraFile camera;
+  slam::Camera::Parameters& p = camera.parameters;
+  p.model = read_model(yaml);
+  p.width_px = yaml.integer("width_px");
+  p.height_px = yaml.integer("height_px");
+  p.fx_px = yaml.number("fx_px");
+  p.fy_px = yaml.number("fy_px");
+  p.cx_px = yaml.number("cx_px");
+  p.cy_px = yaml.number("cy_px");
+  const bool radtan = p.model == slam::CameraModel::kPinholeRadtan;
+  const std::vector<double> distortion =
+      yaml.numbers("distortion", radtan ? std::vector<std::size_t>{0, 4, 5} : std::vector<std::size_t>{4});
+  std::copy(distortion.begin(), distortion.end(), p.distortion.begin());
+  const std::string complaint = slam::Camera::check(p);
+  if (!complaint.empty()) throw InputError(file.string() + ": " + complaint);
+
+  if (yaml.has("T_body_camera")) {
+    camera.T_body_camera = yaml.rigid_motion(yaml.require("T_body_camera"), "T_body_camera");
+  }
+  camera.rate_hz = yaml.number_or("rate_hz", 0.0);
+  if (camera.rate_hz < 0.0) yaml.fail(yaml.require("rate_hz"), "expected rate_hz >= 0 (0: unknown)");
+  camera.row_time_s = yaml.number_or("row_time_s", -1.0);
+  if (camera.row_time_s > kMaxRowTime_s) {
+    yaml.fail(yaml.require("row_time_s"), "expected row_time_s in seconds, at most 0.001 (0: global, negative: unknown)");
+  }
+  return camera;
+}
+
+}  // namespace farpoint::tools

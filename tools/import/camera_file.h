@@ -1,0 +1,22 @@
+// Camera files (config/cameras/*.yaml): one calibrated camera, every key explained in config/cameras/README.md.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "slam/geometry/camera.h"
+#include "slam/geometry/se3.h"
+
+namespace farpoint::tools {
+
+struct CameraFile {
+  slam::Camera::Parameters parameters;
+  std::optional<slam::SE3> T_body_camera;   // nothing: the file names no body
+  double rate_hz = 0.0;                     // nominal; 0 unknown
+  double row_time_s = -1.0;                 // rolling shutter: one row to the next; 0 global; negative unknown
+};
+
+// Throws InputError naming file, line, key and what was expected.
+[[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
+
+}  // namespace farpoint::tools

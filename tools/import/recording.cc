@@ -1,0 +1,62 @@
+#include "tools/import/recording.h"
+
+#include <algorithm>
+#include <span>
+
+#include "ipc/image_codec.h"
+#include "tools/common/errors.h"
+#include "tools/common/text_file.h"
+#include "tools/evaluate/statistics.h"
+
+namespace farpoint::tools {
+namespace {
+
+const RecordingImage& first_image_of(const Recording& recording, int camera) {
+  const auto found = std::find_if(recording.images.begin(), recording.images.end(),
+                                  [camera](const RecordingImage& image) { return image.camera == camera; });
+  return *found;   // the importers drop cameras without an image
+}
+
+double median_rate_hz(const Recording& recording, int camera) {
+  std::vector<double> intervals_s;
+  std::int64_t last_utime = -1;
+  for (const RecordingImage& image : recording.images) {
+    if (image.camera != camera) continue;
+    if (last_utime >= 0) intervals_s.push_back(static_cast<double>(image.utime - last_utime) * 1e-6);
+    last_utime = image.utime;
+  }
+  return intervals_s.empty() ? 0.0 : 1.0 / percentile(std::move(intervals_s), 50.0);
+}
+
+}  // namespace
+
+ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file) {
+  const std::span data(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  const std::optional<ipc::ImageInfo> info = ipc::probe_image(data);
+  if (!info) throw InputError(file.string() + ": expected a PNG or JPEG image, found neither or a damaged one");
+  return *info;
+}
+
+slam::SE3 forward_looking_T_body_camera() {
+  Eigen::Matrix3d R_body_camera;
+  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {Eigen::Quaterniond(R_body_camera).normalized(), Eigen::Vector3d::Zero()};
+}
+
+void complete_cameras(const std::filesystem::path& calibration, Recording* recording) {
+  for (std::size_t c = 0; c < recording->cameras.size(); ++c) {
+    RecordingCamera& camera = recording->cameras[c];
+    const int index = static_cast<int>(c);
+    if (camera.parameters.width_px == 0) {
+      const std::filesystem::path& file = first_image_of(*recording, index).file;
+      const ipc::ImageInfo info = probe_image_file(read_file(file), file);
+      camera.parameters.width_px = info.width_px;
+      camera.parameters.height_px = info.height_px;
+    }
+    const std::string complaint = slam::Camera::check(camera.parameters);
+    if (!complaint.empty()) throw InputError(calibration.string() + ": camera " + camera.name + ": " + complaint);
+    if (camera.rate_hz == 0.0) camera.rate_hz = median_rate_hz(*recording, index);
+  }
+}
+
+}  // namespace farpoint::tools

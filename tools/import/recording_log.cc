@@ -1,0 +1,175 @@
+#include "tools/import/recording_log.h"
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include "ipc/channels.h"
+#include "ipc/log.h"
+#include "tools/common/errors.h"
+#include "tools/common/progress.h"
+#include "tools/common/text_file.h"
+
+namespace farpoint::tools {
+namespace {
+
+// Order of messages of one time: what happened up to a frame comes before it.
+enum class Kind : int { kImu = 0, kTruth = 1, kImage = 2 };
+
+struct Event {
+  std::int64_t utime;
+  Kind kind;
+  std::size_t index;
+};
+
+std::vector<Event> events_in_order(const Recording& recording) {
+  std::vector<Event> events;
+  for (std::size_t i = 0; i < recording.imu.size(); ++i) events.push_back({recording.imu[i].utime, Kind::kImu, i});
+  for (std::size_t i = 0; i < recording.truth.size(); ++i) {
+    events.push_back({recording.truth[i].utime, Kind::kTruth, i});
+  }
+  for (std::size_t i = 0; i < recording.images.size(); ++i) {
+    events.push_back({recording.images[i].utime, Kind::kImage, i});
+  }
+  std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) {
+    return a.utime != b.utime ? a.utime < b.utime : a.kind < b.kind;
+  });
+  return events;
+}
+
+void set_vector(const Eigen::Vector3d& v, double* out) { std::copy(v.data(), v.data() + 3, out); }
+
+void set_quaternion(const Eigen::Quaterniond& q, double* out) {
+  out[0] = q.w();
+  out[1] = q.x();
+  out[2] = q.y();
+  out[3] = q.z();
+}
+
+camera_calibration_t to_message(const RecordingCamera& camera) {
+  const slam::Camera::Parameters& p = camera.parameters;
+  camera_calibration_t message{};
+  message.name = camera.name;
+  message.model = p.model == slam::CameraModel::kKannalaBrandt ? "kannala-brandt" : "pinhole-radtan";
+  message.width = p.width_px;
+  message.height = p.height_px;
+  message.fx = p.fx_px;
+  message.fy = p.fy_px;
+  message.cx = p.cx_px;
+  message.cy = p.cy_px;
+  std::copy(p.distortion.begin(), p.distortion.end(), message.distortion);
+  set_vector(camera.T_body_camera.t, message.position);
+  set_quaternion(camera.T_body_camera.q, message.orientation);
+  message.rate_hz = camera.rate_hz;
+  message.row_time_s = camera.row_time_s;
+  return message;
+}
+
+calibration_t calibration_message(const Recording& recording, std::int64_t utime) {
+  calibration_t message{};
+  message.utime = utime;
+  message.body_name = recording.body_name;
+  for (const RecordingCamera& camera : recording.cameras) message.cameras.push_back(to_message(camera));
+  message.ncameras = static_cast<std::int32_t>(message.cameras.size());
+  message.imu_orientation[0] = 1.0;
+  if (!recording.imu_calibration) return message;
+  const ImuCalibration& imu = *recording.imu_calibration;
+  message.has_imu = 1;
+  set_vector(imu.T_body_imu.t, message.imu_position);
+  set_quaternion(imu.T_body_imu.q, message.imu_orientation);
+  message.imu_rate_hz = imu.rate_hz;
+  message.gyro_noise_density = imu.gyro_noise_density;
+  message.gyro_random_walk = imu.gyro_random_walk;
+  message.accel_noise_density = imu.accel_noise_density;
+  message.accel_random_walk = imu.accel_random_walk;
+  return message;
+}
+
+imu_t to_message(const RecordingImu& sample) {
+  imu_t message{};
+  message.utime = sample.utime;
+  set_vector(sample.angular_velocity_radps, message.angular_velocity);
+  set_vector(sample.acceleration_mps2, message.acceleration);
+  message.temperature = std::numeric_limits<double>::quiet_NaN();
+  return message;
+}
+
+ground_truth_t to_message(const RecordingTruth& truth, bool has_orientation) {
+  ground_truth_t message{};
+  message.utime = truth.utime;
+  set_vector(truth.T_world_body.t, message.position);
+  message.has_orientation = has_orientation ? 1 : 0;
+  set_quaternion(has_orientation ? truth.T_world_body.q : Eigen::Quaterniond::Identity(), message.orientation);
+  return message;
+}
+
+image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
+  const std::string bytes = read_file(image.file);
+  const ipc::ImageInfo info = probe_image_file(bytes, image.file);
+  if (info.width_px != camera.parameters.width_px || info.height_px != camera.parameters.height_px) {
+    throw InputError(image.file.string() + ": expected " + std::to_string(camera.parameters.width_px) + "x" +
+                     std::to_string(camera.parameters.height_px) + " pixels as of camera " + camera.name + ", found " +
+                     std::to_string(info.width_px) + "x" + std::to_string(info.height_px));
+  }
+  image_t message{};
+  message.utime = image.utime;
+  message.sequence = image.sequence;
+  message.camera = image.camera;
+  message.exposure_us = -1;
+  message.gain = -1.0F;
+  message.width = info.width_px;
+  message.height = info.height_px;
+  message.pixel_format = info.pixel_format;
+  message.size = static_cast<std::int32_t>(bytes.size());
+  message.data.assign(bytes.begin(), bytes.end());
+  return message;
+}
+
+void write_event(const Recording& recording, const Event& event, ipc::LogWriter* log) {
+  switch (event.kind) {
+    case Kind::kImu:
+      log->write_message(ipc::kImuChannel, event.utime, to_message(recording.imu[event.index]));
+      return;
+    case Kind::kTruth:
+      log->write_message(ipc::kGroundTruthChannel, event.utime,
+                         to_message(recording.truth[event.index], recording.truth_has_orientation));
+      return;
+    case Kind::kImage: {
+      const RecordingImage& image = recording.images[event.index];
+      const std::string channel = ipc::kCameraChannelPrefix + std::to_string(image.camera);
+      const RecordingCamera& camera = recording.cameras[static_cast<std::size_t>(image.camera)];
+      log->write_message(channel, event.utime, to_message(image, camera));
+      return;
+    }
+  }
+}
+
+std::unique_ptr<ipc::LogWriter> open_log(const std::filesystem::path& file) {
+  try {
+    return std::make_unique<ipc::LogWriter>(file.string());
+  } catch (const std::runtime_error& e) {
+    throw InputError(e.what());   // a name that cannot be written is wrong use
+  }
+}
+
+}  // namespace
+
+void write_recording(const Recording& recording, const std::filesystem::path& log_file) {
+  const std::vector<Event> events = events_in_order(recording);
+  const std::unique_ptr<ipc::LogWriter> log = open_log(log_file);
+  const std::int64_t first_utime = events.front().utime;   // every importer demands an image
+  log->write_message(ipc::kCalibrationChannel, first_utime, calibration_message(recording, first_utime));
+  Progress progress(log_file.filename().string(), events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    write_event(recording, events[i], log.get());
+    if (!log->error().empty()) break;
+    progress.advance(i + 1);
+  }
+  try {
+    log->close();
+  } catch (const std::runtime_error& e) {
+    throw RunError(e.what());
+  }
+}
+
+}  // namespace farpoint::tools
