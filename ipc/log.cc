@@ -110,8 +110,9 @@ bool LogReader::whole_event_here(Header* header) {
   const std::size_t bytes = header->event_bytes();
   if (!available(bytes)) return false;
   if (!available(bytes + 1)) return true;
-  if (available(bytes + kSyncBytes) && is_sync(here() + bytes)) return true;
-  return !header_within(kHeaderBytes, bytes);
+  const bool has_next = available(bytes + kSyncBytes);
+  if (has_next && is_sync(here() + bytes)) return true;
+  return !header_within(kHeaderBytes, has_next ? bytes + kSyncBytes : bytes);
 }
 
 void LogReader::skip(std::size_t bytes) {

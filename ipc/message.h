@@ -41,7 +41,7 @@ inline constexpr std::string_view kLayout<calibration_t> = "8s#[0:ss8 32 40 56 1
 template <>
 inline constexpr std::string_view kLayout<ground_truth_t> = "8 24 1 32";
 template <>
-inline constexpr std::string_view kLayout<image_t> = "16 12 4 12 4#[0:1]";
+inline constexpr std::string_view kLayout<image_t> = "16 12 12 4 #[0:1]";
 template <>
 inline constexpr std::string_view kLayout<imu_t> = "8 24 24 8";
 template <>

@@ -1,0 +1,262 @@
+#include "ipc/image_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <string>
+
+#include <jpeglib.h>
+#include <png.h>
+
+namespace farpoint::ipc {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+// A smooth picture: JPEG keeps it within a few grey levels.
+Bytes picture(int width_px, int height_px, int channels) {
+  Bytes out;
+  for (int v = 0; v < height_px; ++v) {
+    for (int u = 0; u < width_px; ++u) {
+      for (int c = 0; c < channels; ++c) {
+        out.push_back(static_cast<std::uint8_t>(128 + 100 * std::sin(0.05 * u + 0.08 * v + c)));
+      }
+    }
+  }
+  return out;
+}
+
+Bytes to_jpeg(const Bytes& pixels, int width_px, int height_px, int channels, bool progressive = false) {
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  unsigned char* out = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&jpeg, &out, &size);
+  jpeg.image_width = static_cast<JDIMENSION>(width_px);
+  jpeg.image_height = static_cast<JDIMENSION>(height_px);
+  jpeg.input_components = channels;
+  jpeg.in_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&jpeg);
+  jpeg_set_quality(&jpeg, 95, TRUE);
+  if (progressive) jpeg_simple_progression(&jpeg);
+  jpeg_start_compress(&jpeg, TRUE);
+  while (jpeg.next_scanline < jpeg.image_height) {
+    JSAMPROW row = const_cast<JSAMPROW>(pixels.data() + jpeg.next_scanline * unsigned(width_px * channels));
+    jpeg_write_scanlines(&jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  jpeg_destroy_compress(&jpeg);
+  Bytes bytes(out, out + size);
+  std::free(out);
+  return bytes;
+}
+
+Bytes to_png(const Bytes& pixels, int width_px, int height_px, int type, int depth, int interlace) {
+  Bytes out;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_set_write_fn(
+      png, &out,
+      [](png_structp p, png_bytep data, std::size_t size) {
+        auto* bytes = static_cast<Bytes*>(png_get_io_ptr(p));
+        bytes->insert(bytes->end(), data, data + size);
+      },
+      nullptr);
+  png_set_IHDR(png, info, png_uint_32(width_px), png_uint_32(height_px), depth, type, interlace,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  const std::size_t row_bytes = png_get_rowbytes(png, info);
+  std::vector<png_bytep> rows;
+  for (int v = 0; v < height_px; ++v) {
+    rows.push_back(const_cast<png_bytep>(pixels.data()) + std::size_t(v) * row_bytes);
+  }
+  png_write_image(png, rows.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  return out;
+}
+
+image_t message(std::int32_t format, int width_px, int height_px, Bytes data) {
+  image_t out{};
+  out.pixel_format = format;
+  out.width = width_px;
+  out.height = height_px;
+  out.size = static_cast<std::int32_t>(data.size());
+  out.data = std::move(data);
+  return out;
+}
+
+int largest_difference(const Bytes& a, const Bytes& b) {
+  int worst = a.size() == b.size() ? 0 : 1000;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    worst = std::max(worst, std::abs(a[i] - b[i]));
+  return worst;
+}
+
+TEST(ImageCodec, GreyIsCopiedWithoutItsPadding) {
+  image_t in = message(image_t::PIXEL_FORMAT_GREY, 3, 2, {1, 2, 3, 99, 4, 5, 6});
+  in.row_stride = 4;
+  ImageDecoder decoder;
+  GreyImage image;
+  ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk);
+  EXPECT_EQ(image.pixels, (Bytes{1, 2, 3, 4, 5, 6}));
+  in.row_stride = 0;
+  in.size = 6;
+  ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk);
+  EXPECT_EQ(image.pixels, (Bytes{1, 2, 3, 99, 4, 5}));
+}
+
+TEST(ImageCodec, GreyOfImpossibleSizeIsRefused) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const Bytes data(6);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_GREY, 4, 2, data), &image), ImageStatus::kWrongSize);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_GREY, -3, -2, data), &image),
+            ImageStatus::kWrongSize);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_GREY, 0, 2, data), &image), ImageStatus::kWrongSize);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_GREY, INT32_MAX, INT32_MAX, data), &image),
+            ImageStatus::kWrongSize);
+  image_t in = message(image_t::PIXEL_FORMAT_GREY, 3, 2, data);
+  in.row_stride = -3;
+  EXPECT_EQ(decoder.decode(in, &image), ImageStatus::kWrongSize);
+  in.row_stride = 0;
+  in.size = -1;
+  EXPECT_EQ(decoder.decode(in, &image), ImageStatus::kWrongSize);
+  in.size = INT32_MAX;  // more than there is
+  EXPECT_EQ(decoder.decode(in, &image), ImageStatus::kOk);
+  in.pixel_format = 5;
+  EXPECT_EQ(decoder.decode(in, &image), ImageStatus::kUnknownFormat);
+}
+
+TEST(ImageCodec, JpegGreyColourProgressive) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const Bytes grey = picture(83, 41, 1);
+  for (const bool progressive : {false, true}) {
+    const image_t in = message(image_t::PIXEL_FORMAT_MJPEG, 83, 41, to_jpeg(grey, 83, 41, 1, progressive));
+    ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk);
+    EXPECT_LE(largest_difference(image.pixels, grey), 6);
+  }
+  Bytes equal_rgb;
+  for (const std::uint8_t value : grey) equal_rgb.insert(equal_rgb.end(), 3, value);
+  const image_t in = message(image_t::PIXEL_FORMAT_MJPEG, 83, 41, to_jpeg(equal_rgb, 83, 41, 3));
+  ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk);
+  EXPECT_LE(largest_difference(image.pixels, grey), 6);
+}
+
+TEST(ImageCodec, PngOfEveryKind) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const int width_px = 37, height_px = 23;
+  const Bytes grey = picture(width_px, height_px, 1);
+  Bytes rgb, rgba, grey16;
+  for (const std::uint8_t value : grey) {
+    rgb.insert(rgb.end(), 3, value);
+    rgba.insert(rgba.end(), {value, value, value, 200});
+    grey16.insert(grey16.end(), {value, value});
+  }
+  for (const int interlace : {PNG_INTERLACE_NONE, PNG_INTERLACE_ADAM7}) {
+    for (const auto& [pixels, type, depth] :
+         {std::tuple{grey, PNG_COLOR_TYPE_GRAY, 8}, std::tuple{rgb, PNG_COLOR_TYPE_RGB, 8},
+          std::tuple{rgba, PNG_COLOR_TYPE_RGB_ALPHA, 8}, std::tuple{grey16, PNG_COLOR_TYPE_GRAY, 16}}) {
+      const image_t in = message(image_t::PIXEL_FORMAT_PNG, width_px, height_px,
+                                 to_png(pixels, width_px, height_px, type, depth, interlace));
+      ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk) << type << " " << depth;
+      EXPECT_LE(largest_difference(image.pixels, grey), 1) << type << " " << depth;
+    }
+  }
+}
+
+TEST(ImageCodec, AnotherSizeThanTheMessageSaysIsRefused) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const Bytes grey = picture(40, 30, 1);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 41, 30, to_jpeg(grey, 40, 30, 1)), &image),
+            ImageStatus::kWrongSize);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 31,
+                                   to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE)),
+                           &image),
+            ImageStatus::kWrongSize);
+}
+
+TEST(ImageCodec, ProbeTellsSizeAndKind) {
+  const Bytes grey = picture(40, 30, 1);
+  const auto jpeg = probe_image(to_jpeg(grey, 40, 30, 1));
+  ASSERT_TRUE(jpeg);
+  EXPECT_EQ(jpeg->pixel_format, +image_t::PIXEL_FORMAT_MJPEG);
+  EXPECT_EQ(jpeg->width_px, 40);
+  EXPECT_EQ(jpeg->height_px, 30);
+  const auto png = probe_image(to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+  ASSERT_TRUE(png);
+  EXPECT_EQ(png->pixel_format, +image_t::PIXEL_FORMAT_PNG);
+  EXPECT_EQ(png->width_px, 40);
+  EXPECT_EQ(png->height_px, 30);
+  EXPECT_FALSE(probe_image({}));
+  EXPECT_FALSE(probe_image(grey));
+}
+
+class DamagedImage : public testing::TestWithParam<bool> {
+ protected:
+  [[nodiscard]] image_t intact() const {
+    const Bytes grey = picture(64, 48, 1);
+    return GetParam() ? message(image_t::PIXEL_FORMAT_MJPEG, 64, 48, to_jpeg(grey, 64, 48, 1))
+                      : message(image_t::PIXEL_FORMAT_PNG, 64, 48,
+                                to_png(grey, 64, 48, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+  }
+};
+
+TEST_P(DamagedImage, CutOffAnywhereIsRefused) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const image_t whole = intact();
+  for (std::int32_t size = 0; size < whole.size; ++size) {
+    image_t cut = whole;
+    cut.size = size;
+    EXPECT_NE(decoder.decode(cut, &image), ImageStatus::kOk) << size << " of " << whole.size;
+    (void)probe_image(std::span(cut.data).first(static_cast<std::size_t>(size)));
+  }
+  EXPECT_EQ(decoder.decode(whole, &image), ImageStatus::kOk);  // and the decoder still works
+}
+
+TEST_P(DamagedImage, FlippedBitsAreSurvived) {
+  ImageDecoder decoder;
+  GreyImage image;
+  const image_t whole = intact();
+  int refused = 0;
+  for (std::size_t bit = 0; bit < 8 * whole.data.size(); bit += 3) {
+    image_t damaged = whole;
+    damaged.data[bit / 8] = static_cast<std::uint8_t>(damaged.data[bit / 8] ^ (1U << (bit % 8)));
+    const ImageStatus status = decoder.decode(damaged, &image);
+    if (status == ImageStatus::kOk) {
+      EXPECT_EQ(image.pixels.size(), 64U * 48U);
+    }
+    refused += status == ImageStatus::kOk ? 0 : 1;
+    (void)probe_image(damaged.data);
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_EQ(decoder.decode(whole, &image), ImageStatus::kOk);
+}
+
+TEST_P(DamagedImage, NoiseIsRefused) {
+  ImageDecoder decoder;
+  GreyImage image;
+  std::mt19937_64 rng(11);
+  for (int i = 0; i < 500; ++i) {
+    image_t noise = intact();
+    for (std::size_t at = static_cast<std::size_t>(rng() % 40); at < noise.data.size(); ++at) {
+      noise.data[at] = static_cast<std::uint8_t>(rng());
+    }
+    EXPECT_NE(decoder.decode(noise, &image), ImageStatus::kOk);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, DamagedImage, testing::Bool(),
+                         [](const auto& info) { return std::string(info.param ? "Jpeg" : "Png"); });
+
+}  // namespace
+}  // namespace farpoint::ipc
