@@ -1,0 +1,268 @@
+#include "slam/map/map.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace farpoint::slam {
+
+Map::Map(const CapacityConfig& capacity, const Rig& rig)
+    : capacity_(capacity),
+      rig_(rig),
+      keyframes_(static_cast<std::size_t>(capacity.keyframes)),
+      landmarks_(static_cast<std::size_t>(capacity.landmarks)),
+      shared_count_(static_cast<std::size_t>(capacity.keyframes), 0) {}
+
+KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
+  const KeyframeHandle handle = keyframes_.allocate();
+  if (handle.is_null()) return handle;
+  Keyframe& slot = keyframes_[handle];
+  slot = std::move(keyframe);
+  slot.id = next_keyframe_id_++;
+  slot.landmarks.assign(slot.set.features.size(), {});
+  slot.covisible.clear();
+  slot.optimised = 0;
+  skeleton_.push_back({handle, 0, {}, true});
+  return handle;
+}
+
+void Map::remove_keyframe(KeyframeHandle handle) {
+  if (!keyframes_.contains(handle)) return;
+  Keyframe& keyframe = keyframes_[handle];
+  // The keyframe that shares most keeps the pose of this one; the nearest id stands in where nothing is shared.
+  KeyframeHandle parent;
+  for (const Covisible& c : keyframe.covisible)
+    if (keyframes_.contains(c.keyframe)) {
+      parent = c.keyframe;
+      break;
+    }
+  if (parent.is_null()) {
+    std::uint64_t best = ~std::uint64_t{0};
+    keyframes_.for_each([&](KeyframeHandle h, const Keyframe& k) {
+      if (h == handle || k.map_id != keyframe.map_id) return;
+      const std::uint64_t gap = k.id > keyframe.id ? k.id - keyframe.id : keyframe.id - k.id;
+      if (gap < best) best = gap, parent = h;
+    });
+  }
+  SkeletonNode& node = skeleton_[keyframe.id - 1];
+  node.alive = {};
+  node.known = !parent.is_null();
+  if (node.known) {
+    node.parent_id = keyframes_[parent].id;
+    node.T_parent_this = keyframes_[parent].T_world_body.inverse() * keyframe.T_world_body;
+  }
+  for (const LandmarkHandle& l : keyframe.landmarks)
+    if (landmarks_.contains(l)) remove_observation(l, handle);
+  for (const Covisible& c : keyframe.covisible)
+    if (Keyframe* other = keyframes_.get(c.keyframe))
+      std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
+  keyframe = Keyframe{};
+  keyframes_.release(handle);
+}
+
+LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
+  Keyframe& keyframe = keyframes_[host];
+  if (!keyframe.landmarks[feature].is_null() || !keyframe.image) return {};
+  Patch patch;
+  if (!keyframe.image->extract_patch(keyframe.set, feature, &patch)) return {};
+  const LandmarkHandle handle = landmarks_.allocate();
+  if (handle.is_null()) return handle;
+  Landmark& l = landmarks_[handle];
+  std::vector<Observation> observations = std::move(l.observations);    // keeps its capacity
+  l = Landmark{};
+  l.observations = std::move(observations);
+  l.observations.clear();
+
+  const Feature& f = keyframe.set.features[feature];
+  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(keyframe.camera)];
+  l.id = next_landmark_id_++;
+  l.map_id = keyframe.map_id;
+  l.host = host;
+  l.T_host_anchor = camera.T_body_camera;
+  l.bearing = keyframe.bearings[feature].cast<double>().normalized();
+  for (int axis = 0; axis < 2; ++axis) {
+    // Central difference over one pixel: exact to second order, and the patch spans several pixels anyway.
+    Eigen::Vector2d plus(f.u_px, f.v_px), minus(f.u_px, f.v_px);
+    plus[axis] += 0.5, minus[axis] -= 0.5;
+    Eigen::Vector3d a, b;
+    if (!camera.camera.unproject(plus, &a) || !camera.camera.unproject(minus, &b)) {
+      landmarks_.release(handle);
+      return {};
+    }
+    l.d_bearing_d_pixel.col(axis) = a - b;
+  }
+  l.patch = patch;
+  l.descriptor = keyframe.set.descriptors[feature];
+  l.host_level = f.level;
+  l.created_keyframe = l.last_seen_keyframe = keyframe.id;
+  l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F});
+  keyframe.landmarks[feature] = handle;
+  return handle;
+}
+
+void Map::detach_feature(const Observation& o) {
+  if (o.feature < 0) return;
+  if (Keyframe* k = keyframes_.get(o.keyframe)) k->landmarks[static_cast<std::size_t>(o.feature)] = {};
+}
+
+void Map::remove_landmark(LandmarkHandle handle) {
+  Landmark* l = landmarks_.get(handle);
+  if (l == nullptr) return;
+  for (const Observation& o : l->observations) detach_feature(o);
+  l->observations.clear();
+  landmarks_.release(handle);
+}
+
+const Observation* Map::find_observation(const Landmark& landmark, KeyframeHandle keyframe) {
+  for (const Observation& o : landmark.observations)
+    if (o.keyframe == keyframe) return &o;
+  return nullptr;
+}
+
+bool Map::add_observation(LandmarkHandle handle, const Observation& observation) {
+  Landmark& l = landmarks_[handle];
+  Keyframe& k = keyframes_[observation.keyframe];
+  if (find_observation(l, observation.keyframe) != nullptr) return false;
+  if (observation.feature >= 0) {
+    LandmarkHandle& owner = k.landmarks[static_cast<std::size_t>(observation.feature)];
+    if (!owner.is_null()) return false;
+    owner = handle;
+  }
+  const auto later = std::find_if(l.observations.begin(), l.observations.end(),
+                                  [&](const Observation& o) { return keyframes_[o.keyframe].id > k.id; });
+  l.observations.insert(later, observation);
+  l.last_seen_keyframe = std::max(l.last_seen_keyframe, k.id);
+  const double angle = parallax(l, observation);
+  if (angle > l.max_parallax_rad) {
+    l.max_parallax_rad = angle;
+    l.parallax_keyframe = observation.keyframe;
+  }
+  if (l.observations.size() > static_cast<std::size_t>(capacity_.observations_per_landmark))
+    thin_observations(l, handle);
+  return true;
+}
+
+void Map::thin_observations(Landmark& l, LandmarkHandle handle) {
+  // The host defines the bearing, the best pair the depth, the newest ones the link to tracking: of the rest the one
+  // in the middle tells least that its neighbours do not.
+  std::size_t middle = l.observations.size() / 2;
+  while (middle + 1 < l.observations.size() && (l.observations[middle].keyframe == l.host ||
+                                                l.observations[middle].keyframe == l.parallax_keyframe))
+    ++middle;
+  remove_observation(handle, l.observations[middle].keyframe);
+}
+
+bool Map::remove_observation(LandmarkHandle handle, KeyframeHandle keyframe) {
+  Landmark& l = landmarks_[handle];
+  const auto it = std::find_if(l.observations.begin(), l.observations.end(),
+                               [&](const Observation& o) { return o.keyframe == keyframe; });
+  if (it == l.observations.end()) return true;
+  detach_feature(*it);
+  l.observations.erase(it);
+  if (l.observations.size() < 2) {
+    remove_landmark(handle);
+    return false;
+  }
+  if (l.parallax_keyframe == keyframe) l.parallax_keyframe = {};
+  if (l.host == keyframe) rehost(handle, l.observations.front().keyframe);
+  return true;
+}
+
+void Map::rehost(LandmarkHandle handle, KeyframeHandle new_host) {
+  Landmark& l = landmarks_[handle];
+  if (l.host == new_host) return;
+  const SE3 T_world_anchor = keyframes_[l.host].T_world_body * l.T_host_anchor;
+  l.T_host_anchor = keyframes_[new_host].T_world_body.inverse() * T_world_anchor;
+  l.host = new_host;
+  // The new host's own sighting stays a measurement: the anchor is no longer its camera.
+}
+
+void Map::fuse(LandmarkHandle into, LandmarkHandle from) {
+  if (into == from || !landmarks_.contains(into) || !landmarks_.contains(from)) return;
+  const std::vector<Observation> moved = landmarks_[from].observations;
+  const std::uint32_t found = landmarks_[from].found, visible = landmarks_[from].visible;
+  remove_landmark(from);
+  for (const Observation& o : moved) {
+    Observation copy = o;
+    // A host's sighting had no error of its own; in the other landmark it is one corner among others.
+    if (copy.sigma_px <= 0.0F) copy.sigma_px = 1.0F;
+    add_observation(into, copy);
+  }
+  landmarks_[into].found += found;
+  landmarks_[into].visible += visible;
+}
+
+SE3 Map::T_world_anchor(const Landmark& l) const { return keyframes_[l.host].T_world_body * l.T_host_anchor; }
+
+SE3 Map::T_world_camera(const Keyframe& k) const {
+  return k.T_world_body * rig_.cameras[static_cast<std::size_t>(k.camera)].T_body_camera;
+}
+
+Eigen::Vector4d Map::world_point(const Landmark& l) const {
+  const SE3 T = T_world_anchor(l);
+  Eigen::Vector4d p;
+  p.head<3>() = T.q * l.bearing + l.inverse_depth * T.t;
+  p[3] = l.inverse_depth;
+  return p;
+}
+
+double Map::parallax(const Landmark& l, const Observation& o) const {
+  const Keyframe& k = keyframes_[o.keyframe];
+  Eigen::Vector3d bearing;
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(k.camera)].camera;
+  if (!camera.unproject(o.pixel.cast<double>(), &bearing)) return 0.0;
+  const Eigen::Vector3d a = T_world_anchor(l).q * l.bearing;
+  const Eigen::Vector3d b = T_world_camera(k).q * bearing;
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+void Map::update_covisibility(KeyframeHandle handle) {
+  Keyframe& keyframe = keyframes_[handle];
+  std::fill(shared_count_.begin(), shared_count_.end(), 0);
+  for (const LandmarkHandle& lh : keyframe.landmarks) {
+    const Landmark* l = landmarks_.get(lh);
+    if (l == nullptr || l->state == LandmarkState::kBearing) continue;
+    for (const Observation& o : l->observations) ++shared_count_[o.keyframe.index];
+  }
+  for (const Covisible& c : keyframe.covisible)
+    if (Keyframe* other = keyframes_.get(c.keyframe))
+      std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
+  const auto stronger = [this](const Covisible& a, const Covisible& b) {
+    if (a.shared != b.shared) return a.shared > b.shared;
+    return keyframes_[a.keyframe].id > keyframes_[b.keyframe].id;
+  };
+  keyframe.covisible.clear();
+  keyframes_.for_each([&](KeyframeHandle h, Keyframe& other) {
+    const int shared = shared_count_[h.index];
+    if (h == handle || shared == 0) return;
+    keyframe.covisible.push_back({h, shared});
+    const Covisible back{handle, shared};
+    other.covisible.insert(std::lower_bound(other.covisible.begin(), other.covisible.end(), back, stronger), back);
+  });
+  std::sort(keyframe.covisible.begin(), keyframe.covisible.end(), stronger);
+}
+
+bool Map::pose_of(std::uint64_t id, SE3* T_world_body) const {
+  SE3 tail;
+  while (id != 0 && id <= skeleton_.size()) {
+    const SkeletonNode& node = skeleton_[id - 1];
+    if (!node.known) return false;
+    if (const Keyframe* k = keyframes_.get(node.alive)) {
+      *T_world_body = k->T_world_body * tail;
+      return true;
+    }
+    tail = node.T_parent_this * tail;
+    id = node.parent_id;
+  }
+  return false;
+}
+
+void Map::discard_map(std::int32_t map_id) {
+  landmarks_.for_each([&](LandmarkHandle h, const Landmark& l) {
+    if (l.map_id == map_id) remove_landmark(h);
+  });
+  keyframes_.for_each([&](KeyframeHandle h, const Keyframe& k) {
+    if (k.map_id == map_id) remove_keyframe(h);
+  });
+}
+
+}  // namespace farpoint::slam

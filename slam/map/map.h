@@ -1,0 +1,88 @@
+// The map: pools of keyframes and landmarks and the links between them. Mapping is its only writer; tracking reads
+// LocalView copies. Keeps both sides of every link consistent:
+//     keyframe.landmarks[o.feature] == landmark   <=>   an observation o of the landmark names keyframe and feature.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/keyframe.h"
+#include "slam/map/landmark.h"
+
+namespace farpoint::slam {
+
+class Map {
+ public:
+  Map(const CapacityConfig& capacity, const Rig& rig);
+
+  // --- keyframes -----------------------------------------------------------------------------------------------
+  // Null when full: the caller makes room first (remove_keyframe).
+  [[nodiscard]] KeyframeHandle add_keyframe(Keyframe&& keyframe);
+  // Re-hosts what it hosts, detaches its observations, remembers its pose in the skeleton relative to its most
+  // covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
+  void remove_keyframe(KeyframeHandle handle);
+
+  // --- landmarks -----------------------------------------------------------------------------------------------
+  // A new landmark of state bearing hosted by (keyframe, feature), with that one observation. Null when full or when
+  // no patch can be cut around the feature.
+  [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, std::size_t feature);
+  void remove_landmark(LandmarkHandle handle);
+  // False where the keyframe already sees the landmark or the feature belongs to another one.
+  bool add_observation(LandmarkHandle landmark, const Observation& observation);
+  // Removes the sighting by `keyframe`; re-hosts where it was the host's. The landmark goes when fewer than two are
+  // left. True while the landmark lives.
+  bool remove_observation(LandmarkHandle landmark, KeyframeHandle keyframe);
+  // Moves the observations of `from` to `into` where they do not collide, then removes `from`.
+  void fuse(LandmarkHandle into, LandmarkHandle from);
+  // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are.
+  void rehost(LandmarkHandle landmark, KeyframeHandle new_host);
+
+  [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe);
+  // Homogeneous world point (x, y, z, rho): the point is xyz / rho, also when rho is 0.
+  [[nodiscard]] Eigen::Vector4d world_point(const Landmark& landmark) const;
+  [[nodiscard]] SE3 T_world_anchor(const Landmark& landmark) const;
+  [[nodiscard]] SE3 T_world_camera(const Keyframe& keyframe) const;
+  // Angle between the host's ray and the observer's, by their bearings and poses, rad.
+  [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
+
+  // --- covisibility --------------------------------------------------------------------------------------------
+  // Counts again which keyframes share landmarks with this one, both ways.
+  void update_covisibility(KeyframeHandle handle);
+
+  // --- the way home --------------------------------------------------------------------------------------------
+  // Pose of any keyframe ever made in a living map by its id, also of removed ones; false where it is unknown.
+  [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const;
+
+  // Everything of one map goes (a map that never came to life).
+  void discard_map(std::int32_t map_id);
+
+  [[nodiscard]] Pool<Keyframe>& keyframes() { return keyframes_; }
+  [[nodiscard]] const Pool<Keyframe>& keyframes() const { return keyframes_; }
+  [[nodiscard]] Pool<Landmark>& landmarks() { return landmarks_; }
+  [[nodiscard]] const Pool<Landmark>& landmarks() const { return landmarks_; }
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+
+ private:
+  // Where a keyframe id is now: alive in a slot, or rigidly attached to another keyframe.
+  struct SkeletonNode {
+    KeyframeHandle alive;
+    std::uint64_t parent_id = 0;
+    SE3 T_parent_this;
+    bool known = false;
+  };
+
+  void detach_feature(const Observation& observation);
+  void thin_observations(Landmark& landmark, LandmarkHandle handle);
+
+  CapacityConfig capacity_;
+  Rig rig_;
+  Pool<Keyframe> keyframes_;
+  Pool<Landmark> landmarks_;
+  std::vector<SkeletonNode> skeleton_;    // by keyframe id - 1
+  std::uint64_t next_keyframe_id_ = 1;
+  std::uint64_t next_landmark_id_ = 1;
+  std::vector<int> shared_count_;         // scratch of update_covisibility, one a keyframe slot
+};
+
+}  // namespace farpoint::slam

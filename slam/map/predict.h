@@ -1,0 +1,71 @@
+// Where a landmark should appear in a camera, and how to find it there. Shared by tracking and mapping.
+#pragma once
+
+#include <cmath>
+#include "slam/geometry/camera.h"
+#include "slam/image/feature_grid.h"
+#include "slam/map/landmark.h"
+
+namespace farpoint::slam {
+
+// Sighting expected in one camera.
+struct Prediction {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  Matrix23d d_pixel_d_point = Matrix23d::Zero();                       // by the point in camera axes
+  Eigen::Matrix2f A_target_host = Eigen::Matrix2f::Identity();         // d(pixel) / d(host pixel)
+  Eigen::Vector2d d_pixel_d_inverse_depth = Eigen::Vector2d::Zero();
+  float scale_change = 1.0F;     // size here / size in the host
+  double view_cosine = 1.0;      // between the anchor's ray and this camera's
+};
+
+// The inputs, in world axes, as ViewLandmark keeps them.
+struct PredictionInput {
+  Eigen::Vector4d point_w = Eigen::Vector4d::Zero();
+  Eigen::Vector3d anchor_w = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, 2> d_point_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();
+};
+
+// False where the landmark does not project into the camera's image (border_px from the edge).
+[[nodiscard]] bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camera_world, double border_px,
+                           Prediction* out);
+
+// Pyramid level on which the landmark should be detected.
+[[nodiscard]] int predicted_level(int host_level, float scale_change, float scale_factor, int levels);
+
+// Two corners so close that they show the same point.
+[[nodiscard]] inline bool same_place(const Feature& a, const Feature& b) {
+  constexpr float kSamePlacePx = 3.0F;
+  return std::abs(a.u_px - b.u_px) < kSamePlacePx && std::abs(a.v_px - b.v_px) < kSamePlacePx;
+}
+
+struct DescriptorQuery {
+  Descriptor descriptor;
+  float u_px = 0, v_px = 0, radius_px = 0;
+  int min_level = 0, max_level = 0;
+  int max_hamming = 64;
+  float ratio = 0.9F;       // best must be below ratio * second best (of another place), 1: no test
+};
+// Index of the best feature that `usable(index)` admits, or -1.
+template <typename Usable>
+[[nodiscard]] int find_descriptor(const FeatureSet& set, const FeatureGrid& grid, const DescriptorQuery& q,
+                                  Usable&& usable, int* distance = nullptr) {
+  int best = -1, best_distance = 257, second_distance = 257;
+  grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
+    if (!usable(i)) return;
+    const int d = hamming_distance(q.descriptor, set.descriptors[i]);
+    if (d < best_distance) {
+      // The same corner found on the next level is no rival.
+      if (best >= 0 && !same_place(set.features[static_cast<std::size_t>(best)], set.features[i]))
+        second_distance = best_distance;
+      best_distance = d;
+      best = static_cast<int>(i);
+    } else if (d < second_distance && !same_place(set.features[static_cast<std::size_t>(best)], set.features[i])) {
+      second_distance = d;
+    }
+  });
+  if (best < 0 || best_distance > q.max_hamming) return -1;
+  if (static_cast<float>(best_distance) > q.ratio * static_cast<float>(second_distance)) return -1;
+  if (distance != nullptr) *distance = best_distance;
+  return best;
+}
+}  // namespace farpoint::slam
