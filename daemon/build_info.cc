@@ -1,6 +1,6 @@
 #include "daemon/build_info.h"
 
-#include "farpoint_build.h"    // made at build time: FARPOINT_VERSION, FARPOINT_COMMIT, FARPOINT_BUILD_TYPE
+#include "farpoint_build.h"  // made at build time: FARPOINT_VERSION, FARPOINT_COMMIT, FARPOINT_BUILD_TYPE
 
 namespace farpoint::daemon {
 

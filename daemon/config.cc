@@ -38,7 +38,8 @@ const std::set<std::string>& section_names() {
   static const std::set<std::string> sections = [] {
     std::set<std::string> names;
     for (const ConfigKey& key : config_keys()) {
-      for (std::size_t dot = key.name.find('.'); dot != std::string::npos; dot = key.name.find('.', dot + 1)) {
+      for (std::size_t dot = key.name.find('.'); dot != std::string::npos;
+           dot = key.name.find('.', dot + 1)) {
         names.insert(key.name.substr(0, dot));
       }
     }
@@ -49,7 +50,8 @@ const std::set<std::string>& section_names() {
 
 const ConfigKey* find_key(const std::string& name) {
   const auto keys = config_keys();
-  const auto found = std::find_if(keys.begin(), keys.end(), [&](const ConfigKey& k) { return k.name == name; });
+  const auto found =
+      std::find_if(keys.begin(), keys.end(), [&](const ConfigKey& k) { return k.name == name; });
   return found == keys.end() ? nullptr : &*found;
 }
 
@@ -95,7 +97,8 @@ std::optional<T> parse_all(std::string text) {
   if (text.starts_with('+')) text.erase(0, 1);
   T value{};
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (result.ec != std::errc() || result.ptr != text.data() + text.size() || text.empty()) return std::nullopt;
+  if (result.ec != std::errc() || result.ptr != text.data() + text.size() || text.empty())
+    return std::nullopt;
   return value;
 }
 
@@ -110,7 +113,8 @@ bool acceptable(const ConfigKey& key, const std::string& text, bool quoted) {
       return !quoted && value && std::isfinite(*value) && *value >= key.min && *value <= key.max;
     }
     case KeyType::kText:
-      return !text.empty() && std::none_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; });
+      return !text.empty() && std::none_of(text.begin(), text.end(),
+                                           [](char c) { return static_cast<unsigned char>(c) < 0x20; });
     case KeyType::kChoice:
       return std::find(key.choices.begin(), key.choices.end(), text) != key.choices.end();
   }
@@ -120,12 +124,13 @@ bool acceptable(const ConfigKey& key, const std::string& text, bool quoted) {
 // One line, whatever the file held.
 [[noreturn]] void fail(const std::string& place, const std::string& message) {
   std::string line = place + ": " + message;
-  std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, '?');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, '?');
   throw ConfigError(line);
 }
 
-void assign(const ConfigKey& key, const std::string& text, bool quoted, const std::string& place, Config* config,
-            ConfigOrigins* origins) {
+void assign(const ConfigKey& key, const std::string& text, bool quoted, const std::string& place,
+            Config* config, ConfigOrigins* origins) {
   if (!acceptable(key, text, quoted)) {
     const bool number_in_quotes = quoted && (key.type == KeyType::kInteger || key.type == KeyType::kNumber);
     fail(place, key.name + ": " + (number_in_quotes ? "text " : "") + quote(text) + ", expected " +
@@ -144,7 +149,8 @@ class FileReader {
   void read_section(const YAML::Node& node, const std::string& section) {
     std::map<std::string, int> seen;
     for (const auto& entry : node) {
-      if (!entry.first.IsScalar()) fail(place(entry.first), "a key is not a word, expected 'section: key: value'");
+      if (!entry.first.IsScalar())
+        fail(place(entry.first), "a key is not a word, expected 'section: key: value'");
       const std::string word = entry.first.Scalar();
       const std::string name = section.empty() ? word : section + "." + word;
       const auto [before, first] = seen.emplace(word, line(entry.first));
@@ -156,14 +162,16 @@ class FileReader {
     }
   }
 
-  [[nodiscard]] std::string place(const YAML::Node& node) const { return file_ + ":" + std::to_string(line(node)); }
+  [[nodiscard]] std::string place(const YAML::Node& node) const {
+    return file_ + ":" + std::to_string(line(node));
+  }
 
  private:
   static int line(const YAML::Node& node) { return node.Mark().line + 1; }
 
   void read_entry(const std::string& name, const YAML::Node& name_node, const YAML::Node& value) {
     if (section_names().contains(name)) {
-      if (value.IsNull()) return;    // every key of the section commented out
+      if (value.IsNull()) return;  // every key of the section commented out
       if (!value.IsMap()) fail(place(name_node), name + ": expected a section with keys below it");
       read_section(value, name);
       return;
@@ -184,12 +192,14 @@ class FileReader {
 
 std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) fail(path, "cannot be opened (" + std::generic_category().message(errno) + "), expected a YAML file");
+  if (!in)
+    fail(path, "cannot be opened (" + std::generic_category().message(errno) + "), expected a YAML file");
   std::string text(kMaxFileBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad()) fail(path, "cannot be read, expected a YAML file");
   text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes) fail(path, "longer than 1 MiB, expected a YAML file like config/farpoint.yaml");
+  if (text.size() > kMaxFileBytes)
+    fail(path, "longer than 1 MiB, expected a YAML file like config/farpoint.yaml");
   return text;
 }
 
@@ -199,20 +209,22 @@ void load_config_file(const std::string& path, Config* config, ConfigOrigins* or
   load_config_text(read_file(path), path, config, origins);
 }
 
-void load_config_text(const std::string& text, const std::string& file_name, Config* config, ConfigOrigins* origins) {
+void load_config_text(const std::string& text, const std::string& file_name, Config* config,
+                      ConfigOrigins* origins) {
   std::vector<YAML::Node> documents;
   try {
     documents = YAML::LoadAll(text);
   } catch (const YAML::Exception& error) {
-    fail(file_name + ":" + std::to_string(error.mark.line + 1), "not YAML: " + error.msg +
-                                                                   ", expected 'section:' and 'key: value' lines");
+    fail(file_name + ":" + std::to_string(error.mark.line + 1),
+         "not YAML: " + error.msg + ", expected 'section:' and 'key: value' lines");
   }
   if (documents.size() > 1) {
     fail(file_name + ":" + std::to_string(documents[1].Mark().line + 1), "a second document, expected one");
   }
   if (documents.empty() || documents[0].IsNull()) return;
   FileReader reader(file_name, config, origins);
-  if (!documents[0].IsMap()) fail(reader.place(documents[0]), "not a map, expected 'section:' and 'key: value' lines");
+  if (!documents[0].IsMap())
+    fail(reader.place(documents[0]), "not a map, expected 'section:' and 'key: value' lines");
   reader.read_section(documents[0], "");
 }
 
@@ -233,18 +245,24 @@ void apply_setting(const std::string& assignment, Config* config, ConfigOrigins*
 void check_relations(const Config& config, const ConfigOrigins& origins) {
   // The place of the pair is where either of the two was last set.
   const auto require_not_above = [&](const std::string& low, const std::string& high) {
-    const auto number = [&](const std::string& name) { return *parse_all<double>(find_key(name)->get(config)); };
+    const auto number = [&](const std::string& name) { return *parse_all<double>(value_text(config, name)); };
     if (number(low) <= number(high)) return;
     const auto set_at = origins.contains(low) ? origins.find(low) : origins.find(high);
     const std::string place = set_at == origins.end() ? "built-in defaults" : set_at->second;
-    fail(place, low + ": " + find_key(low)->get(config) + ", expected at most " + high + " (" +
-                    find_key(high)->get(config) + ")");
+    fail(place, low + ": " + value_text(config, low) + ", expected at most " + high + " (" +
+                    value_text(config, high) + ")");
   };
   require_not_above("extractor.fast_threshold_min", "extractor.fast_threshold");
   require_not_above("tracking.min_inliers", "tracking.degraded_inliers");
   require_not_above("mapping.quick_view_delay_frames", "mapping.full_view_delay_frames");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");
+}
+
+std::string value_text(const Config& config, const std::string& name) {
+  const ConfigKey* key = find_key(name);
+  if (key == nullptr) throw std::out_of_range("no configuration key " + name);
+  return key->get(config);
 }
 
 std::string canonical_text(const Config& config) {
@@ -256,7 +274,8 @@ std::string canonical_text(const Config& config) {
     if (section != open_section) out << section << ":\n";
     open_section = section;
     const bool text = key.type == KeyType::kText;
-    out << "  " << key.name.substr(dot + 1) << ": " << (text ? quoted_yaml(key.get(config)) : key.get(config)) << '\n';
+    out << "  " << key.name.substr(dot + 1) << ": " << (text ? quoted_yaml(key.get(config)) : key.get(config))
+        << '\n';
   }
   return out.str();
 }
@@ -270,6 +289,8 @@ std::uint64_t fnv1a_64(const std::string& text) {
   return hash;
 }
 
-std::uint64_t config_hash(const Config& config) { return fnv1a_64(canonical_text(config)); }
+std::uint64_t config_hash(const Config& config) {
+  return fnv1a_64(canonical_text(config));
+}
 
 }  // namespace farpoint::daemon

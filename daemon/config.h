@@ -1,8 +1,8 @@
 // The daemon's configuration: farpoint.yaml and --set, checked key by key.
 //
-// One table (config_keys()) knows every key: name, type, unit, range, and the field it fills. Parsing, checking, the
-// canonical text, its hash and the test that config/farpoint.yaml tells the truth are all driven by it, so a new key is
-// one line in config_keys.cc and one entry in config/farpoint.yaml.
+// One table (config_keys()) knows every key: name, type, unit, range, and the field it fills. Parsing,
+// checking, the canonical text, its hash and the test that config/farpoint.yaml tells the truth are all
+// driven by it, so a new key is one line in config_keys.cc and one entry in config/farpoint.yaml.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +23,11 @@ struct LogConfig {
 };
 
 struct CameraConfig {
-  int index = 0;    // which camera of the log, and of its calibration, is tracked
+  int index = 0;  // which camera of the log, and of its calibration, is tracked
 };
 
 struct ScaleConfig {
-  double assumed = 0.0;    // metres a map unit; 0: unknown
+  double assumed = 0.0;  // metres a map unit; 0: unknown
 };
 
 struct LcmConfig {
@@ -60,10 +60,10 @@ enum class KeyType { kInteger, kNumber, kText, kChoice };
 
 // One key of the configuration.
 struct ConfigKey {
-  std::string name;    // dotted: section.key
+  std::string name;  // dotted: section.key
   KeyType type = KeyType::kInteger;
-  std::string unit;              // "px", "frames", ...; empty where the value has none
-  double min = 0.0, max = 0.0;   // inclusive; numbers only
+  std::string unit;             // "px", "frames", ...; empty where the value has none
+  double min = 0.0, max = 0.0;  // inclusive; numbers only
   std::vector<std::string> choices;
   // Canonical text of the value: a number's shortest form that reads back to the same bits.
   std::function<std::string(const Config&)> get;
@@ -83,12 +83,15 @@ using ConfigOrigins = std::map<std::string, std::string>;
 
 // Reads a YAML file, or text that stands for it, over *config. Throws ConfigError.
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins);
-void load_config_text(const std::string& text, const std::string& file_name, Config* config, ConfigOrigins* origins);
+void load_config_text(const std::string& text, const std::string& file_name, Config* config,
+                      ConfigOrigins* origins);
 // Applies one "dotted.key=value" of the command line. Throws ConfigError.
 void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins);
 // Checks what concerns more than one key. Throws ConfigError.
 void check_relations(const Config& config, const ConfigOrigins& origins);
 
+// Canonical text of one key's value. Throws std::out_of_range for a name that is not in the table.
+[[nodiscard]] std::string value_text(const Config& config, const std::string& name);
 // Every key as YAML, in table order and in one spelling: equal texts mean equal configurations, and
 // load_config_text() reads it back.
 [[nodiscard]] std::string canonical_text(const Config& config);

@@ -1,5 +1,5 @@
-// The table of all configuration keys. Ranges are wide on purpose: they stop typing errors and what cannot work, not
-// experiments.
+// The table of all configuration keys. Ranges are wide on purpose: they stop typing errors and what cannot
+// work, not experiments.
 #include <charconv>
 #include <cmath>
 #include <system_error>
@@ -71,7 +71,10 @@ ConfigKey enumeration(const char* name, const std::vector<std::string>& choices,
 }
 
 // A function object that gives the named field, const or not like the configuration.
-#define FIELD(path) [](auto& c) -> auto& { return c.path; }
+#define FIELD(path)      \
+  [](auto& c) -> auto& { \
+    return c.path;       \
+  }
 
 std::vector<ConfigKey> make_keys() {
   return {
@@ -93,7 +96,8 @@ std::vector<ConfigKey> make_keys() {
 
       integer("extractor.features", "features", 50, 20000, FIELD(estimator.extractor.features)),
       integer("extractor.fast_threshold", "grey levels", 1, 255, FIELD(estimator.extractor.fast_threshold)),
-      integer("extractor.fast_threshold_min", "grey levels", 1, 255, FIELD(estimator.extractor.fast_threshold_min)),
+      integer("extractor.fast_threshold_min", "grey levels", 1, 255,
+              FIELD(estimator.extractor.fast_threshold_min)),
       integer("extractor.cell_px", "px", 8, 512, FIELD(estimator.extractor.cell_px)),
 
       integer("capacity.keyframes", "keyframes", 10, 100000, FIELD(estimator.capacity.keyframes)),
@@ -102,8 +106,10 @@ std::vector<ConfigKey> make_keys() {
               FIELD(estimator.capacity.observations_per_landmark)),
       integer("capacity.window_images", "images", 2, 1000, FIELD(estimator.capacity.window_images)),
 
-      number("initialisation.min_parallax_rad", "rad", 1e-4, 1, FIELD(estimator.initialisation.min_parallax_rad)),
-      integer("initialisation.min_landmarks", "landmarks", 10, 20000, FIELD(estimator.initialisation.min_landmarks)),
+      number("initialisation.min_parallax_rad", "rad", 1e-4, 1,
+             FIELD(estimator.initialisation.min_parallax_rad)),
+      integer("initialisation.min_landmarks", "landmarks", 10, 20000,
+              FIELD(estimator.initialisation.min_landmarks)),
       number("initialisation.max_frames", "frames", 2, 100000, FIELD(estimator.initialisation.max_frames)),
 
       number("tracking.prior_search_px", "px", 1, 500, FIELD(estimator.tracking.prior_search_px)),
@@ -115,21 +121,27 @@ std::vector<ConfigKey> make_keys() {
       number("tracking.pixel_sigma_px", "px", 0.01, 10, FIELD(estimator.tracking.pixel_sigma_px)),
 
       number("keyframes.tracked_ratio", "", 0.05, 1, FIELD(estimator.keyframes.tracked_ratio)),
-      integer("keyframes.max_interval_frames", "frames", 1, 100000, FIELD(estimator.keyframes.max_interval_frames)),
+      integer("keyframes.max_interval_frames", "frames", 1, 100000,
+              FIELD(estimator.keyframes.max_interval_frames)),
       number("keyframes.min_parallax_px", "px", 0.1, 1000, FIELD(estimator.keyframes.min_parallax_px)),
 
       enumeration("landmarks.mode", {"baseline", "vmp"}, FIELD(estimator.landmarks.mode)),
-      number("landmarks.promote_parallax_rad", "rad", 1e-5, 1, FIELD(estimator.landmarks.promote_parallax_rad)),
-      number("landmarks.promote_relative_sigma", "", 0.001, 1, FIELD(estimator.landmarks.promote_relative_sigma)),
+      number("landmarks.promote_parallax_rad", "rad", 1e-5, 1,
+             FIELD(estimator.landmarks.promote_parallax_rad)),
+      number("landmarks.promote_relative_sigma", "", 0.001, 1,
+             FIELD(estimator.landmarks.promote_relative_sigma)),
       integer("landmarks.max_bearing", "landmarks", 0, 5000000, FIELD(estimator.landmarks.max_bearing)),
 
       integer("mapping.neighbours", "keyframes", 1, 1000, FIELD(estimator.mapping.neighbours)),
       integer("mapping.window_keyframes", "keyframes", 2, 1000, FIELD(estimator.mapping.window_keyframes)),
-      integer("mapping.window_landmarks", "landmarks", 50, 5000000, FIELD(estimator.mapping.window_landmarks)),
+      integer("mapping.window_landmarks", "landmarks", 50, 5000000,
+              FIELD(estimator.mapping.window_landmarks)),
       integer("mapping.fixed_keyframes", "keyframes", 0, 10000, FIELD(estimator.mapping.fixed_keyframes)),
       integer("mapping.iterations", "steps", 1, 1000, FIELD(estimator.mapping.iterations)),
-      integer("mapping.quick_view_delay_frames", "frames", 1, 1000, FIELD(estimator.mapping.quick_view_delay_frames)),
-      integer("mapping.full_view_delay_frames", "frames", 1, 1000, FIELD(estimator.mapping.full_view_delay_frames)),
+      integer("mapping.quick_view_delay_frames", "frames", 1, 1000,
+              FIELD(estimator.mapping.quick_view_delay_frames)),
+      integer("mapping.full_view_delay_frames", "frames", 1, 1000,
+              FIELD(estimator.mapping.full_view_delay_frames)),
       choice("mapping.solver", {"schur", "ceres"}, FIELD(estimator.mapping.solver)),
   };
 }
@@ -154,10 +166,14 @@ std::span<const ConfigKey> config_keys() {
 std::string expectation(const ConfigKey& key) {
   const std::string unit = key.unit.empty() ? "" : " (" + key.unit + ")";
   switch (key.type) {
-    case KeyType::kInteger: return "an integer from " + range_text(key) + unit;
-    case KeyType::kNumber: return "a number from " + range_text(key) + unit;
-    case KeyType::kText: return "text";
-    case KeyType::kChoice: return "one of " + range_text(key);
+    case KeyType::kInteger:
+      return "an integer from " + range_text(key) + unit;
+    case KeyType::kNumber:
+      return "a number from " + range_text(key) + unit;
+    case KeyType::kText:
+      return "text";
+    case KeyType::kChoice:
+      return "one of " + range_text(key);
   }
   return "";
 }

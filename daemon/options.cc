@@ -12,16 +12,20 @@ namespace {
 constexpr const char* kDescription =
     "farpointd: visual SLAM with distant landmarks.\n"
     "\n"
-    "Replays a recorded LCM log (made by 'farpoint import', 'farpoint simulate' or lcm-logger), tracks its camera\n"
-    "against a map, and gives pose as LCM messages, odometry as CAN frames and trajectories as files. Camera data\n"
+    "Replays a recorded LCM log (made by 'farpoint import', 'farpoint simulate' or lcm-logger), tracks its "
+    "camera\n"
+    "against a map, and gives pose as LCM messages, odometry as CAN frames and trajectories as files. Camera "
+    "data\n"
     "and calibration come from the log.";
 
 constexpr const char* kFooter =
     "Examples\n"
     "  farpoint import kitti /data/kitti 03 -o run.lcm\n"
-    "  farpointd --replay run.lcm --lockstep --output out.lcm --trajectory final.tum --live-trajectory live.tum\n"
+    "  farpointd --replay run.lcm --lockstep --output out.lcm --trajectory final.tum --live-trajectory "
+    "live.tum\n"
     "  farpointd --replay run.lcm --lockstep --can-log out.candump --set scale.assumed=1\n"
-    "  farpointd --replay run.lcm --lockstep --lcm-url 'udpm://239.255.76.67:7667?ttl=0'    (watch with lcm-spy)\n"
+    "  farpointd --replay run.lcm --lockstep --lcm-url 'udpm://239.255.76.67:7667?ttl=0'    (watch with "
+    "lcm-spy)\n"
     "  farpoint evaluate out.lcm --truth run.lcm\n"
     "\n"
     "Exit status: 0 done (a run that was lost or never initialised is done; its last line says so);\n"
@@ -36,17 +40,21 @@ struct Parsed {
 
 void add_options(CLI::App* app, Parsed* parsed) {
   Options& o = parsed->options;
-  app->add_option("--config", o.config_path,
-                  "Configuration; else /etc/farpoint/farpoint.yaml where it exists, else built-in defaults (equal to "
-                  "config/farpoint.yaml, which explains every key)")
+  app->add_option(
+         "--config", o.config_path,
+         "Configuration; else /etc/farpoint/farpoint.yaml where it exists, else built-in defaults (equal to "
+         "config/farpoint.yaml, which explains every key)")
       ->type_name("FILE");
   app->add_option("--replay", o.replay, "LCM log to replay; '-' is standard input")->type_name("LOG");
-  app->add_flag("--lockstep", parsed->lockstep,
-                "One frame after the other, everything in one order: the same log and configuration give the same "
-                "bytes, whatever the machine's load");
-  app->add_option("--speed", parsed->speed, "Threaded replay at X times the recorded pace (not in this version)")
+  app->add_flag(
+      "--lockstep", parsed->lockstep,
+      "One frame after the other, everything in one order: the same log and configuration give the same "
+      "bytes, whatever the machine's load");
+  app->add_option("--speed", parsed->speed,
+                  "Threaded replay at X times the recorded pace (not in this version)")
       ->type_name("X");
-  app->add_option("--schedule", parsed->schedule, "'recorded': replay a live run's thread order (not in this version)")
+  app->add_option("--schedule", parsed->schedule,
+                  "'recorded': replay a live run's thread order (not in this version)")
       ->type_name("recorded");
   app->add_option("--output", o.output,
                   "Everything that is published, the final trajectory and a summary, as LCM log")
@@ -58,8 +66,10 @@ void add_options(CLI::App* app, Parsed* parsed) {
   app->add_option("--live-trajectory", o.live_trajectory,
                   "Live trajectory: each frame's pose as it was published as valid")
       ->type_name("FILE");
-  app->add_option("--can-log", o.can_log, "CAN frames as text, like 'candump -L' writes it")->type_name("FILE");
-  app->add_option("--lcm-url", o.lcm_url, "Publish over the network too; without URL: lcm.url of the configuration")
+  app->add_option("--can-log", o.can_log, "CAN frames as text, like 'candump -L' writes it")
+      ->type_name("FILE");
+  app->add_option("--lcm-url", o.lcm_url,
+                  "Publish over the network too; without URL: lcm.url of the configuration")
       ->type_name("[URL]")
       ->expected(0, 1);
   app->add_option("--can", o.can_interface,
@@ -72,23 +82,39 @@ void add_options(CLI::App* app, Parsed* parsed) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+// True for NAME.map2.tum, NAME.map3.tum, ... where the trajectory is NAME.tum.
+bool is_further_map_of(const std::string& trajectory, const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::filesystem::path first =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(trajectory), ignored);
+  const std::string start = first.stem().string() + ".map";
+  const std::string name = path.stem().string();
+  return path.parent_path() == first.parent_path() && path.extension() == first.extension() &&
+         name.starts_with(start) && name.size() > start.size() &&
+         name.find_first_not_of("0123456789", start.size()) == std::string::npos;
+}
+
 void check(const Parsed& parsed) {
   const Options& o = parsed.options;
-  if (o.replay.empty()) throw UsageError("--replay LOG is missing; live cameras are not in this version (see --help)");
+  if (o.replay.empty())
+    throw UsageError("--replay LOG is missing; live cameras are not in this version (see --help)");
   if (!parsed.schedule.empty()) {
     throw UsageError("--schedule " + parsed.schedule + ": not in this version, expected --lockstep");
   }
-  if (parsed.lockstep && parsed.speed) throw UsageError("--lockstep and --speed exclude each other, expected one");
+  if (parsed.lockstep && parsed.speed)
+    throw UsageError("--lockstep and --speed exclude each other, expected one");
   if (parsed.speed) throw UsageError("--speed: threaded replay is not in this version, expected --lockstep");
   if (!parsed.lockstep) {
-    throw UsageError("--lockstep is missing: threaded replay is not in this version, expected --replay LOG --lockstep");
+    throw UsageError(
+        "--lockstep is missing: threaded replay is not in this version, expected --replay LOG --lockstep");
   }
   // Two outputs in one file, or an output over the input, would destroy what the user wants to keep.
   std::map<std::filesystem::path, std::string> used;
   const auto claim = [&](const std::string& path, const std::string& name) {
     if (path.empty() || (name == "--replay" && path == "-")) return;
     std::error_code ignored;
-    const std::filesystem::path real = std::filesystem::weakly_canonical(std::filesystem::absolute(path), ignored);
+    const std::filesystem::path real =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(path), ignored);
     const auto [before, first] = used.emplace(real, name);
     if (!first && !std::filesystem::is_character_file(real, ignored)) {
       throw UsageError(name + " " + path + ": the same file as " + before->second + ", expected another");
@@ -99,6 +125,13 @@ void check(const Parsed& parsed) {
   claim(o.trajectory, "--trajectory");
   claim(o.live_trajectory, "--live-trajectory");
   claim(o.can_log, "--can-log");
+  // Further maps go beside the final trajectory: no other output may have their name.
+  for (const auto& [path, name] : used) {
+    if (!o.trajectory.empty() && is_further_map_of(o.trajectory, path)) {
+      throw UsageError(name + " " + path.string() +
+                       ": kept for a further map of --trajectory, expected another name");
+    }
+  }
 }
 
 }  // namespace

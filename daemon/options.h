@@ -11,11 +11,11 @@ namespace farpoint::daemon {
 // What the daemon was asked to do. Empty paths mean "not wanted".
 struct Options {
   std::optional<std::string> config_path;
-  std::string replay;    // "-" is standard input
+  std::string replay;  // "-" is standard input
   std::string output, trajectory, live_trajectory, can_log;
   // Engaged but empty: wanted, with lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;
-  std::vector<std::string> settings;    // "dotted.key=value", in order
+  std::vector<std::string> settings;  // "dotted.key=value", in order
 };
 
 // Wrong use: what() is one line with what, where and what was expected. Exit status 2.
@@ -24,7 +24,8 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Outcome of reading the command line: either options, or text to print (--help, --version) and leave with status 0.
+// Outcome of reading the command line: either options, or text to print (--help, --version) and leave with
+// status 0.
 struct CommandLine {
   Options options;
   std::string text_and_leave;

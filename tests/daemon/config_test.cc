@@ -73,8 +73,8 @@ TEST(ConfigFile, ShippedFileDocumentsEveryKeyTruthfully) {
 TEST(ConfigFile, ValuesReachTheEstimator) {
   Config config;
   ConfigOrigins origins;
-  load_config_text("tracking:\n  min_inliers: 12\nlandmarks: {mode: baseline}\nscale:\n  assumed: 2.5e0\n", "f.yaml",
-                   &config, &origins);
+  load_config_text("tracking:\n  min_inliers: 12\nlandmarks: {mode: baseline}\nscale:\n  assumed: 2.5e0\n",
+                   "f.yaml", &config, &origins);
   EXPECT_EQ(config.estimator.tracking.min_inliers, 12);
   EXPECT_EQ(config.estimator.landmarks.mode, slam::LandmarkMode::kBaseline);
   EXPECT_EQ(config.scale.assumed, 2.5);
@@ -110,10 +110,13 @@ TEST(ConfigKeys, DefaultsLieInTheirRanges) {
 TEST(ConfigMistakes, UnknownKeySaysFileLineAndTheNearestKey) {
   EXPECT_EQ(error_of("log:\n  level: info\ntracking:\n  min_inlier: 30\n"),
             "f.yaml:4: tracking.min_inlier: unknown key, did you mean 'tracking.min_inliers'?");
-  EXPECT_EQ(error_of("traking:\n  min_inliers: 30\n"), "f.yaml:1: traking: unknown key, did you mean 'tracking'?");
-  EXPECT_EQ(error_of("tracking:\n  max_interval_frames: 3\n"),
-            "f.yaml:2: tracking.max_interval_frames: unknown key, did you mean 'keyframes.max_interval_frames'?");
-  EXPECT_EQ(error_of("zzzzzzzzzz: 1\n"), "f.yaml:1: zzzzzzzzzz: unknown key, expected a key of config/farpoint.yaml");
+  EXPECT_EQ(error_of("traking:\n  min_inliers: 30\n"),
+            "f.yaml:1: traking: unknown key, did you mean 'tracking'?");
+  EXPECT_EQ(
+      error_of("tracking:\n  max_interval_frames: 3\n"),
+      "f.yaml:2: tracking.max_interval_frames: unknown key, did you mean 'keyframes.max_interval_frames'?");
+  EXPECT_EQ(error_of("zzzzzzzzzz: 1\n"),
+            "f.yaml:1: zzzzzzzzzz: unknown key, expected a key of config/farpoint.yaml");
 }
 
 TEST(ConfigMistakes, WrongTypeSaysWhatWasExpected) {
@@ -122,7 +125,8 @@ TEST(ConfigMistakes, WrongTypeSaysWhatWasExpected) {
   EXPECT_EQ(error_of("tracking:\n  min_inliers: 3.5\n"),
             "f.yaml:2: tracking.min_inliers: '3.5', expected an integer from 4 to 20000 (landmarks)");
   EXPECT_EQ(error_of("tracking:\n  min_inliers: \"30\"\n"),
-            "f.yaml:2: tracking.min_inliers: text '30', expected an integer from 4 to 20000 (landmarks) without quotes");
+            "f.yaml:2: tracking.min_inliers: text '30', expected an integer from 4 to 20000 (landmarks) "
+            "without quotes");
   EXPECT_EQ(error_of("tracking:\n  min_inliers: 30px\n"),
             "f.yaml:2: tracking.min_inliers: '30px', expected an integer from 4 to 20000 (landmarks)");
   EXPECT_EQ(error_of("tracking:\n  min_inliers: [30]\n"),
@@ -132,14 +136,18 @@ TEST(ConfigMistakes, WrongTypeSaysWhatWasExpected) {
   EXPECT_EQ(error_of("tracking:\n  min_inliers: {a: 1}\n"),
             "f.yaml:2: tracking.min_inliers: a section, expected an integer from 4 to 20000 (landmarks)");
   EXPECT_EQ(error_of("tracking: 3\n"), "f.yaml:1: tracking: expected a section with keys below it");
-  EXPECT_EQ(error_of("landmarks:\n  mode: vpm\n"), "f.yaml:2: landmarks.mode: 'vpm', expected one of baseline | vmp");
+  EXPECT_EQ(error_of("landmarks:\n  mode: vpm\n"),
+            "f.yaml:2: landmarks.mode: 'vpm', expected one of baseline | vmp");
   EXPECT_EQ(error_of("lcm:\n  url: ''\n"), "f.yaml:2: lcm.url: '', expected text");
 }
 
 TEST(ConfigMistakes, OutOfRange) {
-  EXPECT_EQ(error_of("pyramid:\n  levels: 0\n"), "f.yaml:2: pyramid.levels: '0', expected an integer from 1 to 16 (levels)");
-  EXPECT_EQ(error_of("pyramid:\n  scale_factor: 1\n"), "f.yaml:2: pyramid.scale_factor: '1', expected a number from 1.05 to 2");
-  for (const char* odd : {"nan", ".nan", "inf", ".inf", "1e400", "-1", "99999999999999999999", "0x10", "1_000", ""}) {
+  EXPECT_EQ(error_of("pyramid:\n  levels: 0\n"),
+            "f.yaml:2: pyramid.levels: '0', expected an integer from 1 to 16 (levels)");
+  EXPECT_EQ(error_of("pyramid:\n  scale_factor: 1\n"),
+            "f.yaml:2: pyramid.scale_factor: '1', expected a number from 1.05 to 2");
+  for (const char* odd :
+       {"nan", ".nan", "inf", ".inf", "1e400", "-1", "99999999999999999999", "0x10", "1_000", ""}) {
     EXPECT_NE(error_of(std::string("scale:\n  assumed: ") + odd + "\n"), "") << odd;
     EXPECT_NE(error_of_setting(std::string("tracking.min_inliers=") + odd), "") << odd;
   }
@@ -153,11 +161,14 @@ TEST(ConfigMistakes, DuplicateKeysAndSections) {
 }
 
 TEST(ConfigMistakes, MalformedYaml) {
-  EXPECT_TRUE(error_of("log:\n  level: [info\nscale:\n").starts_with("f.yaml:")) << error_of("log:\n  level: [info\n");
+  EXPECT_TRUE(error_of("log:\n  level: [info\nscale:\n").starts_with("f.yaml:"))
+      << error_of("log:\n  level: [info\n");
   EXPECT_NE(error_of("log:\n  level: [info\n").find("not YAML"), std::string::npos);
-  EXPECT_TRUE(error_of("log:\n\tlevel: info\n").starts_with("f.yaml:2: not YAML")) << error_of("log:\n\tlevel: info\n");
+  EXPECT_TRUE(error_of("log:\n\tlevel: info\n").starts_with("f.yaml:2: not YAML"))
+      << error_of("log:\n\tlevel: info\n");
   EXPECT_EQ(error_of("- a\n- b\n"), "f.yaml:1: not a map, expected 'section:' and 'key: value' lines");
-  EXPECT_EQ(error_of("log:\n  level: info\n---\nlog:\n  level: info\n"), "f.yaml:4: a second document, expected one");
+  EXPECT_EQ(error_of("log:\n  level: info\n---\nlog:\n  level: info\n"),
+            "f.yaml:4: a second document, expected one");
   EXPECT_EQ(error_of("? [a, b]\n: 1\n"), "f.yaml:1: a key is not a word, expected 'section: key: value'");
   EXPECT_NE(error_of("log: &a\n  level: *b\n"), "");
   EXPECT_NE(error_of(std::string(100000, '[')), "");
@@ -165,7 +176,8 @@ TEST(ConfigMistakes, MalformedYaml) {
 }
 
 TEST(ConfigMistakes, OneLineEachWhateverTheText) {
-  for (const char* text : {"log:\n  level: |\n    a\n    b\n", "\"a\\nb\": 1\n", "log:\n  \"x\\ty\\n\": 1\n"}) {
+  for (const char* text :
+       {"log:\n  level: |\n    a\n    b\n", "\"a\\nb\": 1\n", "log:\n  \"x\\ty\\n\": 1\n"}) {
     const std::string error = error_of(text);
     EXPECT_FALSE(error.empty()) << text;
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
@@ -183,7 +195,8 @@ TEST(ConfigMistakes, Settings) {
   EXPECT_EQ(error_of_setting("tracking.min_inliers"),
             "--set: 'tracking.min_inliers', expected dotted.key=value, like tracking.min_inliers=30");
   EXPECT_EQ(error_of_setting("=3"), "--set: '=3', expected dotted.key=value, like tracking.min_inliers=30");
-  EXPECT_EQ(error_of_setting("tracking=3"), "--set: tracking: a section, expected one of its keys, like tracking.key=value");
+  EXPECT_EQ(error_of_setting("tracking=3"),
+            "--set: tracking: a section, expected one of its keys, like tracking.key=value");
   EXPECT_EQ(error_of_setting("tracking.min_inlers=30"),
             "--set: tracking.min_inlers: unknown key, did you mean 'tracking.min_inliers'?");
   EXPECT_EQ(error_of_setting("log.level=loud"),
@@ -197,7 +210,8 @@ TEST(ConfigMistakes, MissingFileAndFolder) {
     load_config_file("/nonexistent/f.yaml", &config, &origins);
     FAIL();
   } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(), "/nonexistent/f.yaml: cannot be opened (No such file or directory), expected a YAML file");
+    EXPECT_STREQ(error.what(),
+                 "/nonexistent/f.yaml: cannot be opened (No such file or directory), expected a YAML file");
   }
   EXPECT_THROW(load_config_file("/tmp", &config, &origins), ConfigError);
 }

@@ -1,0 +1,55 @@
+// Where encoded LCM messages go.
+#pragma once
+
+#include <lcm/lcm.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "ipc/log.h"
+
+namespace farpoint::daemon {
+
+// One way out for LCM messages. Errors are counted, never thrown.
+class MessageSink {
+ public:
+  virtual ~MessageSink() = default;
+  virtual void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) = 0;
+  [[nodiscard]] virtual std::uint64_t errors() const = 0;
+};
+
+// Into a log; the event's time is the message's utime.
+class LogMessageSink final : public MessageSink {
+ public:
+  // The log must outlive the sink.
+  explicit LogMessageSink(ipc::LogWriter* log) : log_(log) {}
+  void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) override;
+  [[nodiscard]] std::uint64_t errors() const override { return errors_; }
+
+ private:
+  ipc::LogWriter* log_;
+  std::uint64_t errors_ = 0;
+};
+
+// Onto the network through LCM. The control path only: the end-of-run messages (trajectory, summary) are for
+// logs.
+class LcmMessageSink final : public MessageSink {
+ public:
+  // Null where LCM cannot use the URL (no multicast route, unknown provider): replay goes on without.
+  [[nodiscard]] static std::unique_ptr<LcmMessageSink> open(const std::string& url);
+  ~LcmMessageSink() override;
+  LcmMessageSink(const LcmMessageSink&) = delete;
+  LcmMessageSink& operator=(const LcmMessageSink&) = delete;
+
+  void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) override;
+  [[nodiscard]] std::uint64_t errors() const override { return errors_; }
+
+ private:
+  explicit LcmMessageSink(lcm_t* lcm) : lcm_(lcm) {}
+  lcm_t* lcm_;
+  std::uint64_t errors_ = 0;
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,27 @@
+// Where a frame's outcome goes: one interface, whether it is a network, a bus or a file.
+#pragma once
+
+#include "slam/estimator.h"
+
+namespace farpoint::daemon {
+
+// What is published of one frame. Lengths are in metres where result.scale is assumed or metric, in map units
+// where it is unknown.
+struct FrameOutput {
+  slam::FrameResult result;
+  // The pose counts: published as valid, part of the live trajectory.
+  bool valid = false;
+};
+
+// The estimator's result with scale.assumed applied (0: none) and its validity decided. A result that is
+// marked valid but holds a number that is not finite is taken for invalid: nothing wrong goes out as valid.
+[[nodiscard]] FrameOutput make_frame_output(const slam::FrameResult& result, double assumed_scale);
+
+// Receives every frame in order. Errors of the outside (no route, bus off) are counted, never thrown.
+class PoseSink {
+ public:
+  virtual ~PoseSink() = default;
+  virtual void on_frame(const FrameOutput& frame) = 0;
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,13 @@
+#include "daemon/publisher.h"
+
+namespace farpoint::daemon {
+
+void Publisher::on_frame(const FrameOutput& frame) {
+  const std::int64_t utime = frame.result.utime;
+  publish(ipc::kOdometryChannel, utime, make_odometry(frame));
+  publish(ipc::kPoseChannel, utime, make_pose(frame));
+  publish(ipc::kMapFromOdomChannel, utime, make_map_from_odom(frame));
+  if (frame.valid) publish(ipc::kBotCorePoseChannel, utime, make_bot_core_pose(frame));
+}
+
+}  // namespace farpoint::daemon

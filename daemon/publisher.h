@@ -1,0 +1,35 @@
+// Turns frames into LCM messages and hands each, encoded once, to every message sink.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "daemon/message_sink.h"
+#include "daemon/messages.h"
+#include "daemon/pose_sink.h"
+#include "ipc/channels.h"
+
+namespace farpoint::daemon {
+
+class Publisher final : public PoseSink {
+ public:
+  void add(std::unique_ptr<MessageSink> sink) { sinks_.push_back(std::move(sink)); }
+  [[nodiscard]] bool has_sinks() const { return !sinks_.empty(); }
+
+  // FARPOINT_ODOMETRY first: it is what a controller waits for. Then POSE, MAP_FROM_ODOM and the viewers'
+  // pose.
+  void on_frame(const FrameOutput& frame) override;
+
+  template <typename Message>
+  void publish(const char* channel, std::int64_t utime, const Message& message) {
+    if (sinks_.empty()) return;
+    ipc::encode(message, &bytes_);
+    for (const auto& sink : sinks_) sink->send(channel, utime, bytes_);
+  }
+
+ private:
+  std::vector<std::unique_ptr<MessageSink>> sinks_;
+  std::vector<std::uint8_t> bytes_;  // keeps its capacity from message to message
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,81 @@
+#include "daemon/stage_clock.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+
+namespace farpoint::daemon {
+namespace {
+
+double clock_s(clockid_t id) {
+  timespec t{};
+  clock_gettime(id, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+// Adds to a time that is negative until the stage runs.
+void add_ms(double began_s, double now_s, double* total_ms) {
+  *total_ms = std::max(*total_ms, 0.0) + 1e3 * (now_s - began_s);
+}
+
+}  // namespace
+
+double thread_cpu_s() {
+  return clock_s(CLOCK_THREAD_CPUTIME_ID);
+}
+double process_cpu_s() {
+  return clock_s(CLOCK_PROCESS_CPUTIME_ID);
+}
+double steady_s() {
+  return clock_s(CLOCK_MONOTONIC);
+}
+
+std::int64_t resident_bytes() {
+  std::FILE* file = std::fopen("/proc/self/statm", "r");
+  if (file == nullptr) return 0;
+  long long total_pages = 0, resident_pages = 0;
+  const int found = std::fscanf(file, "%lld %lld", &total_pages, &resident_pages);
+  std::fclose(file);
+  return found == 2 ? resident_pages * sysconf(_SC_PAGESIZE) : 0;
+}
+
+std::int64_t peak_resident_bytes() {
+  rusage usage{};
+  if (getrusage(RUSAGE_SELF, &usage) != 0) return 0;
+  return std::int64_t{usage.ru_maxrss} * 1024;  // Linux counts in kilobytes
+}
+
+void StageClock::new_frame() {
+  cpu_ms_.fill(-1.0);
+  wall_ms_.fill(-1.0);
+}
+
+void StageClock::begin(int stage) {
+  cpu_began_s_.at(static_cast<std::size_t>(stage)) = thread_cpu_s();
+  wall_began_s_.at(static_cast<std::size_t>(stage)) = steady_s();
+}
+
+void StageClock::end(int stage) {
+  const auto i = static_cast<std::size_t>(stage);
+  add_ms(cpu_began_s_.at(i), thread_cpu_s(), &cpu_ms_.at(i));
+  add_ms(wall_began_s_.at(i), steady_s(), &wall_ms_.at(i));
+}
+
+timing_t StageClock::message(std::int64_t utime, std::int64_t sequence) const {
+  timing_t m{};
+  m.utime = utime;
+  m.sequence = sequence;
+  std::copy(cpu_ms_.begin(), cpu_ms_.end(), m.cpu_ms);
+  std::copy(wall_ms_.begin(), wall_ms_.end(), m.wall_ms);
+  m.latency_ms = -1.0;  // a recording and this machine have no common clock
+  m.deadline_ms = 0.0;
+  m.process_cpu_s = process_cpu_s();
+  m.resident_bytes = resident_bytes();
+  m.peak_resident_bytes = peak_resident_bytes();
+  return m;
+}
+
+}  // namespace farpoint::daemon
