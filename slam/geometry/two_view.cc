@@ -1,0 +1,572 @@
+#include "slam/geometry/two_view.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "slam/geometry/five_point.h"
+#include "slam/geometry/random.h"
+#include "slam/geometry/relative_motion.h"
+#include "slam/geometry/triangulation.h"
+
+namespace farpoint::slam {
+
+namespace {
+
+// Chi-square limits of an inlier, 99 %, for 1 and 2 degrees of freedom.
+constexpr double kChi2_1Dof = 6.63;
+constexpr double kChi2_2Dof = 9.21;
+// Median of a chi-square variable with 1 degree of freedom.
+constexpr double kChi2Median_1Dof = 0.455;
+// Chance that RANSAC may miss every clean sample.
+constexpr double kMissChance = 1e-3;
+// Sampled by every model whatever the inlier share: minimal samples of noisy matches differ in quality.
+constexpr int kMinSamples = 60;
+// Essential matrices (Frobenius norm 1) further apart than this count as different hypotheses.
+constexpr double kDifferentEssential = 0.25;
+constexpr size_t kMaxHypotheses = 4;
+// Refined motions further apart than this are rivals, not the same optimum.
+constexpr double kDifferentTranslation_rad = 0.2;
+constexpr double kDifferentRotation_rad = 0.05;
+// A point counts as in front of both views unless it is behind one by more than this many sigma.
+constexpr double kBehindSigmas = 3.0;
+// The homography must beat the essential motion's GRIC by this factor.
+constexpr double kHomographyAdvantage = 0.98;
+
+// Matches as single-precision columns, padded with zeros to whole blocks; a zero match costs nothing in any model.
+class MatchColumns {
+ public:
+  MatchColumns(Bearings bearings_1, Bearings bearings_2) {
+    const Eigen::Index n = static_cast<Eigen::Index>(bearings_1.size());
+    const Eigen::Index padded = (n + kBlock - 1) / kBlock * kBlock;
+    columns_.setZero(padded, 6);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      columns_.row(i).head<3>() = bearings_1[static_cast<size_t>(i)].cast<float>().transpose();
+      columns_.row(i).tail<3>() = bearings_2[static_cast<size_t>(i)].cast<float>().transpose();
+    }
+  }
+
+  // Sum of min(residual2, limit2) over all matches; stops early, at a value of at least `enough`, once it is reached.
+  // Kernel: (x1, y1, z1, x2, y2, z2 blocks) -> block of squared residuals in rad^2.
+  template <typename Kernel>
+  [[nodiscard]] float cost(const Kernel& kernel, float limit2, float enough) const {
+    float sum = 0.0F;
+    for (Eigen::Index i = 0; i < columns_.rows() && sum < enough; i += kBlock) {
+      sum += residuals2(kernel, i).min(limit2).sum();
+    }
+    return sum;
+  }
+  // Number of matches with residual2 < limit2, padding included.
+  template <typename Kernel>
+  [[nodiscard]] Eigen::Index count(const Kernel& kernel, float limit2) const {
+    Eigen::Index total = 0;
+    for (Eigen::Index i = 0; i < columns_.rows(); i += kBlock) total += (residuals2(kernel, i) < limit2).count();
+    return total;
+  }
+  [[nodiscard]] Eigen::Index padded() const { return columns_.rows(); }
+
+  static constexpr Eigen::Index kBlock = 32;
+  using Block = Eigen::Array<float, kBlock, 1>;
+
+ private:
+  template <typename Kernel>
+  [[nodiscard]] Block residuals2(const Kernel& kernel, Eigen::Index i) const {
+    const auto column = [&](Eigen::Index k) -> Block { return columns_.col(k).template segment<kBlock>(i); };
+    return kernel(column(0), column(1), column(2), column(3), column(4), column(5));
+  }
+
+  Eigen::ArrayXXf columns_;
+};
+
+using Block = MatchColumns::Block;
+constexpr float kTiny = 1e-20F;
+
+// Squared Sampson angle of an essential matrix of any scale.
+struct EssentialKernel {
+  Eigen::Matrix3f e;
+  Block operator()(const Block& x1, const Block& y1, const Block& z1, const Block& x2, const Block& y2,
+                   const Block& z2) const {
+    const Block nx = e(0, 0) * x1 + e(0, 1) * y1 + e(0, 2) * z1;
+    const Block ny = e(1, 0) * x1 + e(1, 1) * y1 + e(1, 2) * z1;
+    const Block nz = e(2, 0) * x1 + e(2, 1) * y1 + e(2, 2) * z1;
+    const Block mx = e(0, 0) * x2 + e(1, 0) * y2 + e(2, 0) * z2;
+    const Block my = e(0, 1) * x2 + e(1, 1) * y2 + e(2, 1) * z2;
+    const Block mz = e(0, 2) * x2 + e(1, 2) * y2 + e(2, 2) * z2;
+    const Block c = nx * x2 + ny * y2 + nz * z2;
+    const Block c2 = c * c;
+    const Block s2 = nx * nx + ny * ny + nz * nz + mx * mx + my * my + mz * mz - 2.0F * c2;
+    return c2 / s2.max(kTiny);
+  }
+};
+
+// Half the squared sine between H b1 and b2: the noise of both views counted as if H kept angles. Opposite directions
+// pass here and fail in the exact residual.
+struct TransferKernel {
+  Eigen::Matrix3f h;
+  Block operator()(const Block& x1, const Block& y1, const Block& z1, const Block& x2, const Block& y2,
+                   const Block& z2) const {
+    const Block px = h(0, 0) * x1 + h(0, 1) * y1 + h(0, 2) * z1;
+    const Block py = h(1, 0) * x1 + h(1, 1) * y1 + h(1, 2) * z1;
+    const Block pz = h(2, 0) * x1 + h(2, 1) * y1 + h(2, 2) * z1;
+    const Block cx = py * z2 - pz * y2, cy = pz * x2 - px * z2, cz = px * y2 - py * x2;
+    return 0.5F * (cx * cx + cy * cy + cz * cz) / (px * px + py * py + pz * pz).max(kTiny);
+  }
+};
+
+// Samples that reach a clean one with the wanted probability at this inlier share.
+int needed_samples(double inlier_share, int sample_size, int max_samples) {
+  const double clean = std::pow(std::clamp(inlier_share, 0.0, 1.0), sample_size);
+  if (clean >= 1.0 - 1e-9) return kMinSamples;
+  const double needed = std::log(kMissChance) / std::log1p(-clean);
+  return needed >= max_samples ? max_samples : std::max(kMinSamples, static_cast<int>(std::ceil(needed)));
+}
+
+struct Problem {
+  Bearings b1, b2;
+  double sigma_rad;
+  const TwoViewOptions& options;
+  MatchColumns columns;
+
+  [[nodiscard]] size_t size() const { return b1.size(); }
+  [[nodiscard]] float limit2(double chi2) const { return static_cast<float>(chi2 * sigma_rad * sigma_rad); }
+  template <typename Kernel>
+  [[nodiscard]] double share(const Kernel& kernel, double chi2) const {
+    const Eigen::Index padding = columns.padded() - static_cast<Eigen::Index>(size());
+    return static_cast<double>(columns.count(kernel, limit2(chi2)) - padding) / static_cast<double>(size());
+  }
+};
+
+template <size_t K>
+void gather(const Problem& p, const std::array<size_t, K>& indices, std::array<Eigen::Vector3d, K>* s1,
+            std::array<Eigen::Vector3d, K>* s2) {
+  for (size_t i = 0; i < K; ++i) {
+    (*s1)[i] = p.b1[indices[i]];
+    (*s2)[i] = p.b2[indices[i]];
+  }
+}
+
+template <size_t K>
+constexpr std::array<uint8_t, K> all_of() {
+  std::array<uint8_t, K> mask{};
+  mask.fill(1);
+  return mask;
+}
+
+// --- rotation alone ---
+
+struct RotationFit {
+  Eigen::Matrix3d R_2_1 = Eigen::Matrix3d::Identity();
+  size_t inliers = 0;
+};
+
+std::vector<uint8_t> rotation_inliers(const Problem& p, const Eigen::Matrix3d& r, double chi2) {
+  std::vector<uint8_t> mask(p.size());
+  for (size_t i = 0; i < p.size(); ++i) {
+    mask[i] = rotation_residual2_rad2(r, p.b1[i], p.b2[i]) < chi2 * p.sigma_rad * p.sigma_rad ? 1 : 0;
+  }
+  return mask;
+}
+
+size_t count_set(const std::vector<uint8_t>& mask) {
+  return static_cast<size_t>(std::count(mask.begin(), mask.end(), uint8_t{1}));
+}
+
+RotationFit find_rotation(const Problem& p) {
+  constexpr size_t kSample = 2;
+  SampleGenerator generator(p.options.seed);
+  RotationFit best;
+  float best_cost = std::numeric_limits<float>::max();
+  int samples = p.options.max_samples;
+  for (int k = 0; k < samples; ++k) {
+    std::array<Eigen::Vector3d, kSample> s1, s2;
+    gather(p, generator.sample<kSample>(p.size()), &s1, &s2);
+    // A rotation keeps angles: most contaminated samples end here.
+    if (std::abs(parallax_angle(s1[0], s1[1]) - parallax_angle(s2[0], s2[1])) > 6.0 * p.sigma_rad) continue;
+    const Eigen::Matrix3d r = fit_rotation(s1, s2, all_of<kSample>());
+    const TransferKernel kernel{r.cast<float>()};
+    const float cost = p.columns.cost(kernel, p.limit2(kChi2_2Dof), best_cost);
+    if (cost >= best_cost) continue;
+    best_cost = cost;
+    best.R_2_1 = r;
+    samples = needed_samples(p.share(kernel, kChi2_2Dof), kSample, p.options.max_samples);
+  }
+  std::vector<uint8_t> mask = rotation_inliers(p, best.R_2_1, kChi2_2Dof);
+  for (int round = 0; round < 3 && count_set(mask) >= kSample; ++round) {
+    best.R_2_1 = fit_rotation(p.b1, p.b2, mask);
+    mask = rotation_inliers(p, best.R_2_1, kChi2_2Dof);
+  }
+  best.inliers = count_set(mask);
+  return best;
+}
+
+// --- homography ---
+
+struct HomographyFit {
+  bool found = false;
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  std::vector<double> chi2;
+  size_t inliers = 0;
+};
+
+HomographyFit find_homography(const Problem& p) {
+  constexpr size_t kSample = 4;
+  SampleGenerator generator(p.options.seed + 1);
+  HomographyFit best;
+  float best_cost = std::numeric_limits<float>::max();
+  int samples = p.options.max_samples;
+  for (int k = 0; k < samples; ++k) {
+    std::array<Eigen::Vector3d, kSample> s1, s2;
+    gather(p, generator.sample<kSample>(p.size()), &s1, &s2);
+    Eigen::Matrix3d h;
+    if (!fit_homography(s1, s2, all_of<kSample>(), &h)) continue;
+    bool forward = true;
+    for (size_t i = 0; i < kSample; ++i) forward = forward && s2[i].dot(h * s1[i]) > 0.0;
+    if (!forward) continue;
+    const TransferKernel kernel{h.cast<float>()};
+    const float cost = p.columns.cost(kernel, p.limit2(kChi2_2Dof), best_cost);
+    if (cost >= best_cost) continue;
+    best_cost = cost;
+    best.found = true;
+    best.h = h;
+    samples = needed_samples(p.share(kernel, kChi2_2Dof), kSample, p.options.max_samples);
+  }
+  if (!best.found) return best;
+  best.h = refine_homography(p.b1, p.b2, p.sigma_rad, best.h);
+  best.chi2.resize(p.size());
+  for (size_t i = 0; i < p.size(); ++i) {
+    best.chi2[i] = homography_residual2_rad2(best.h, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
+    best.inliers += best.chi2[i] < kChi2_2Dof ? 1U : 0U;
+  }
+  return best;
+}
+
+// --- essential motion ---
+
+struct EssentialHypothesis {
+  float cost;
+  Eigen::Matrix3d e;
+};
+
+double essential_distance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return std::min((a - b).norm(), (a + b).norm());
+}
+
+// Keeps the best few hypotheses that differ from each other, best first.
+void keep(const EssentialHypothesis& candidate, std::vector<EssentialHypothesis>* kept) {
+  for (const EssentialHypothesis& other : *kept) {
+    if (other.cost <= candidate.cost && essential_distance(other.e, candidate.e) < kDifferentEssential) return;
+  }
+  std::erase_if(*kept, [&](const EssentialHypothesis& other) {
+    return essential_distance(other.e, candidate.e) < kDifferentEssential;
+  });
+  const auto place = std::find_if(kept->begin(), kept->end(),
+                                  [&](const EssentialHypothesis& other) { return candidate.cost < other.cost; });
+  kept->insert(place, candidate);
+  if (kept->size() > kMaxHypotheses) kept->pop_back();
+}
+
+std::vector<EssentialHypothesis> find_essentials(const Problem& p) {
+  constexpr size_t kSample = 5;
+  SampleGenerator generator(p.options.seed + 2);
+  std::vector<EssentialHypothesis> kept;
+  float best_cost = std::numeric_limits<float>::max();
+  int samples = p.options.max_samples;
+  for (int k = 0; k < samples; ++k) {
+    std::array<Eigen::Vector3d, kSample> s1, s2;
+    gather(p, generator.sample<kSample>(p.size()), &s1, &s2);
+    const EssentialCandidates candidates = solve_five_point(s1, s2);
+    for (size_t i = 0; i < candidates.count; ++i) {
+      const EssentialKernel kernel{candidates.matrix[i].cast<float>()};
+      const float enough = kept.size() < kMaxHypotheses ? std::numeric_limits<float>::max() : kept.back().cost;
+      const float cost = p.columns.cost(kernel, p.limit2(kChi2_1Dof), enough);
+      if (cost >= enough) continue;
+      keep({cost, candidates.matrix[i]}, &kept);
+      if (cost >= best_cost) continue;
+      best_cost = cost;
+      samples = needed_samples(p.share(kernel, kChi2_1Dof), kSample, p.options.max_samples);
+    }
+  }
+  return kept;
+}
+
+// --- comparing motions ---
+
+enum class Side : uint8_t { kFront, kBehind, kNoDepth };
+
+// One match under one motion.
+struct MatchGeometry {
+  double chi2 = 0.0;  // epipolar residual
+  Side side = Side::kNoDepth;
+  double inverse_depth = 0.0;
+  double inverse_depth_sigma = 0.0;
+  double parallax_rad = 0.0;
+};
+
+MatchGeometry match_geometry(const SE3& T_2_1, const Eigen::Vector3d& b1, const Eigen::Vector3d& b2,
+                             double sigma_rad) {
+  MatchGeometry m;
+  m.chi2 = epipolar_residual2_rad2(T_2_1, b1, b2) / (sigma_rad * sigma_rad);
+  const InverseDepth depth = triangulate_inverse_depth(b1, T_2_1, b2);
+  m.inverse_depth = depth.inverse_depth;
+  m.parallax_rad = depth.parallax_rad;
+  m.inverse_depth_sigma = inverse_depth_sigma(b1, T_2_1, std::max(0.0, depth.inverse_depth), sigma_rad, sigma_rad);
+  if (depth.ok && depth.inverse_depth > 0.0) {
+    m.side = Side::kFront;
+  } else {
+    // Infinity within the noise, if the rays point the same way; along the baseline there is no depth to be wrong.
+    const bool far = (T_2_1.q * b1).dot(b2) > 0.0 && depth.inverse_depth <= 0.0 &&
+                     depth.inverse_depth > -kBehindSigmas * m.inverse_depth_sigma;
+    m.side = far ? Side::kNoDepth : Side::kBehind;
+  }
+  return m;
+}
+
+struct Candidate {
+  SE3 T_2_1;
+  SE3 unrefined_T_2_1;
+  bool from_homography = false;
+  double translation_sigma_rad = 0.0;
+  double cost = 0.0;
+};
+
+// Truncated chi-squares of the epipolar residuals; a point behind a view costs as much as an outlier.
+double motion_cost(const Problem& p, const SE3& T_2_1) {
+  double cost = 0.0;
+  for (size_t i = 0; i < p.size(); ++i) {
+    const double chi2 = epipolar_residual2_rad2(T_2_1, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
+    if (chi2 >= kChi2_1Dof || match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad).side == Side::kBehind) {
+      cost += kChi2_1Dof;
+    } else {
+      cost += chi2;
+    }
+  }
+  return cost;
+}
+
+// The motion of an essential matrix that puts most points in front of both views.
+SE3 motion_in_front(const Problem& p, const Eigen::Matrix3d& essential) {
+  SE3 best;
+  double best_cost = std::numeric_limits<double>::max();
+  for (const SE3& motion : decompose_essential(essential)) {
+    const double cost = motion_cost(p, motion);
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = motion;
+    }
+  }
+  return best;
+}
+
+double rotation_difference_rad(const SE3& a, const SE3& b) { return so3_log(a.q.conjugate() * b.q).norm(); }
+
+bool different(const SE3& a, const SE3& b) {
+  return parallax_angle(a.t, b.t) > kDifferentTranslation_rad ||
+         rotation_difference_rad(a, b) > kDifferentRotation_rad;
+}
+
+// Motions of both models, each at its own optimum of the epipolar cost, best first.
+std::vector<Candidate> refined_candidates(const Problem& p, const std::vector<EssentialHypothesis>& essentials,
+                                          const HomographyFit& plane) {
+  std::vector<Candidate> candidates;
+  for (const EssentialHypothesis& hypothesis : essentials) {
+    const SE3 motion = motion_in_front(p, hypothesis.e);
+    candidates.push_back({motion, motion, false, 0.0, 0.0});
+  }
+  if (plane.found) {
+    const PlaneMotions motions = decompose_homography(plane.h);
+    for (size_t i = 0; i < motions.count; ++i) {
+      candidates.push_back({motions.motion[i].T_2_1, motions.motion[i].T_2_1, true, 0.0, 0.0});
+    }
+  }
+  for (Candidate& candidate : candidates) {
+    const MotionFit fit = refine_motion(p.b1, p.b2, p.sigma_rad, candidate.T_2_1);
+    candidate.T_2_1 = fit.T_2_1;
+    candidate.translation_sigma_rad = fit.translation_sigma_rad;
+    candidate.cost = motion_cost(p, fit.T_2_1);
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  return candidates;
+}
+
+// Torr's GRIC over the matches that either model explains: residuals truncated at 2 (r - d), plus the price of the
+// structure's dimension d (a point on a plane has 2, in space 3, data dimension r = 4) and of the k parameters.
+bool plane_is_better(const HomographyFit& plane, const std::vector<MatchGeometry>& general) {
+  double cost_plane = 0.0, cost_general = 0.0, n = 0.0;
+  for (size_t i = 0; i < general.size(); ++i) {
+    if (plane.chi2[i] >= kChi2_2Dof && general[i].chi2 >= kChi2_1Dof) continue;
+    cost_plane += std::min(plane.chi2[i], 4.0) + 2.0 * std::log(4.0);
+    cost_general += std::min(general[i].chi2, 2.0) + 3.0 * std::log(4.0);
+    n += 1.0;
+  }
+  if (n < 1.0) return false;
+  cost_plane += 8.0 * std::log(4.0 * n);
+  cost_general += 5.0 * std::log(4.0 * n);
+  return cost_plane < kHomographyAdvantage * cost_general;
+}
+
+// Variance of the residuals in units of sigma^2 as the matches show it, at least 1.
+double observed_variance(const std::vector<MatchGeometry>& geometry) {
+  std::vector<double> chi2;
+  for (const MatchGeometry& m : geometry) {
+    if (m.chi2 < kChi2_1Dof && m.side != Side::kBehind) chi2.push_back(m.chi2);
+  }
+  if (chi2.empty()) return 1.0;
+  const auto middle = chi2.begin() + static_cast<std::ptrdiff_t>(chi2.size() / 2);
+  std::nth_element(chi2.begin(), middle, chi2.end());
+  return std::max(1.0, *middle / kChi2Median_1Dof);
+}
+
+std::vector<MatchGeometry> all_geometry(const Problem& p, const SE3& T_2_1) {
+  std::vector<MatchGeometry> geometry(p.size());
+  for (size_t i = 0; i < p.size(); ++i) geometry[i] = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad);
+  return geometry;
+}
+
+bool is_inlier(const MatchGeometry& m) { return m.chi2 < kChi2_1Dof && m.side != Side::kBehind; }
+
+void fill_matches(const std::vector<MatchGeometry>& geometry, TwoViewResult* result) {
+  std::vector<double> parallaxes;
+  result->inliers = 0;
+  result->valid_depths = 0;
+  for (size_t i = 0; i < geometry.size(); ++i) {
+    const bool inlier = is_inlier(geometry[i]);
+    const bool deep = inlier && geometry[i].side == Side::kFront;
+    result->inlier[i] = inlier ? 1 : 0;
+    result->inverse_depth[i] = deep ? geometry[i].inverse_depth : 0.0;
+    result->parallax_rad[i] = geometry[i].parallax_rad;
+    result->inliers += inlier ? 1U : 0U;
+    if (deep) parallaxes.push_back(geometry[i].parallax_rad);
+  }
+  result->valid_depths = parallaxes.size();
+  if (parallaxes.empty()) return;
+  const auto middle = parallaxes.begin() + static_cast<std::ptrdiff_t>(parallaxes.size() / 2);
+  std::nth_element(parallaxes.begin(), middle, parallaxes.end());
+  result->median_parallax_rad = *middle;
+}
+
+void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewResult* result) {
+  result->status = TwoViewStatus::kNoParallax;
+  result->model = TwoViewModel::kNone;
+  result->T_2_1 = {Eigen::Quaterniond(rotation.R_2_1).normalized(), Eigen::Vector3d::Zero()};
+  result->inlier = rotation_inliers(p, rotation.R_2_1, kChi2_2Dof);
+  result->inliers = rotation.inliers;
+  result->valid_depths = 0;
+  result->median_parallax_rad = 0.0;
+  for (size_t i = 0; i < p.size(); ++i) {
+    result->inverse_depth[i] = 0.0;
+    result->parallax_rad[i] = parallax_angle(rotation.R_2_1 * p.b1[i], p.b2[i]);
+  }
+}
+
+// Share of the matches that the motion explains and the rotation does not, at the noise as it turned out.
+double unexplained_share(const Problem& p, const RotationFit& rotation, const std::vector<MatchGeometry>& geometry) {
+  const double limit = kChi2_2Dof * observed_variance(geometry) * p.sigma_rad * p.sigma_rad;
+  size_t explained = 0, unexplained = 0;
+  for (size_t i = 0; i < p.size(); ++i) {
+    if (!is_inlier(geometry[i])) continue;
+    (rotation_residual2_rad2(rotation.R_2_1, p.b1[i], p.b2[i]) < limit ? explained : unexplained) += 1;
+  }
+  const size_t all = explained + unexplained;
+  return all > 0 ? static_cast<double>(unexplained) / static_cast<double>(all) : 0.0;
+}
+
+bool enough_inliers(const Problem& p, size_t inliers) {
+  return inliers >= p.options.min_inliers &&
+         static_cast<double>(inliers) >= p.options.min_inlier_share * static_cast<double>(p.size());
+}
+
+// The best motion of the plane itself where the plane is the model: it uses both residuals of each match.
+const Candidate* plane_candidate(const std::vector<Candidate>& candidates) {
+  const auto same = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    return c.from_homography && !different(c.T_2_1, candidates.front().T_2_1) &&
+           !different(c.unrefined_T_2_1, c.T_2_1);
+  });
+  return same == candidates.end() ? nullptr : &*same;
+}
+
+double rival_margin(const std::vector<Candidate>& candidates, double variance) {
+  for (const Candidate& c : candidates) {
+    if (different(c.T_2_1, candidates.front().T_2_1)) return (c.cost - candidates.front().cost) / variance;
+  }
+  return std::numeric_limits<double>::max();
+}
+
+}  // namespace
+
+const char* name(TwoViewStatus status) {
+  switch (status) {
+    case TwoViewStatus::kOk: return "ok";
+    case TwoViewStatus::kTooFewMatches: return "too few matches";
+    case TwoViewStatus::kNoParallax: return "no parallax";
+    case TwoViewStatus::kAmbiguous: return "ambiguous";
+    case TwoViewStatus::kPoorModel: return "poor model";
+  }
+  return "unknown";
+}
+
+TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
+                                std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
+                                const TwoViewOptions& options) {
+  TwoViewResult result;
+  const size_t n = std::min(bearings_1.size(), bearings_2.size());
+  result.matches = n;
+  result.inlier.assign(n, 0);
+  result.inverse_depth.assign(n, 0.0);
+  result.parallax_rad.assign(n, 0.0);
+  if (n < std::max<size_t>(options.min_matches, 6) || !(sigma_rad > 0.0)) return result;
+  bearings_1 = bearings_1.first(n);
+  bearings_2 = bearings_2.first(n);
+  const Problem p{bearings_1, bearings_2, sigma_rad, options, MatchColumns(bearings_1, bearings_2)};
+
+  const RotationFit rotation = find_rotation(p);
+  result.rotation_inliers = rotation.inliers;
+  if (static_cast<double>(rotation.inliers) >= (1.0 - options.max_unexplained_share) * static_cast<double>(n)) {
+    result.unexplained_share = 1.0 - static_cast<double>(rotation.inliers) / static_cast<double>(n);
+    set_rotation_only(p, rotation, &result);
+    return result;
+  }
+
+  const std::vector<EssentialHypothesis> essentials = find_essentials(p);
+  const HomographyFit plane = find_homography(p);
+  result.homography_inliers = plane.inliers;
+  const std::vector<Candidate> candidates = refined_candidates(p, essentials, plane);
+  result.status = TwoViewStatus::kPoorModel;
+  if (candidates.empty()) return result;
+
+  const Candidate& best = candidates.front();
+  std::vector<MatchGeometry> geometry = all_geometry(p, best.T_2_1);
+  result.essential_inliers = static_cast<size_t>(std::count_if(geometry.begin(), geometry.end(), is_inlier));
+  result.unexplained_share = unexplained_share(p, rotation, geometry);
+  if (result.unexplained_share <= options.max_unexplained_share && enough_inliers(p, rotation.inliers)) {
+    set_rotation_only(p, rotation, &result);
+    return result;
+  }
+
+  result.model = TwoViewModel::kEssential;
+  result.T_2_1 = best.T_2_1;
+  result.translation_sigma_rad = best.translation_sigma_rad;
+  if (plane.found && plane_is_better(plane, geometry)) {
+    if (const Candidate* on_plane = plane_candidate(candidates)) {
+      result.model = TwoViewModel::kHomography;
+      result.T_2_1 = on_plane->unrefined_T_2_1;
+      geometry = all_geometry(p, result.T_2_1);
+    }
+  }
+  fill_matches(geometry, &result);
+  const double variance = observed_variance(geometry);
+  result.rival_cost_margin = rival_margin(candidates, variance);
+  if (!enough_inliers(p, result.inliers)) {
+    result.status = TwoViewStatus::kPoorModel;
+  } else if (result.rival_cost_margin < options.ambiguity_margin ||
+             result.translation_sigma_rad * std::sqrt(variance) > options.max_translation_sigma_rad) {
+    result.status = TwoViewStatus::kAmbiguous;
+  } else {
+    result.status = TwoViewStatus::kOk;
+  }
+  return result;
+}
+
+}  // namespace farpoint::slam
