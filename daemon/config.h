@@ -37,8 +37,11 @@ struct LcmConfig {
   int map_points = 2000;
 };
 
+enum class CanPoseFrame { kMap, kOdom };
+
 struct CanConfig {
   std::string interface = "can0";
+  CanPoseFrame frame = CanPoseFrame::kMap;
 };
 
 struct Config {

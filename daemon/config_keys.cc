@@ -90,6 +90,7 @@ std::vector<ConfigKey> make_keys() {
       integer("lcm.map_points", "points", 0, 100000, FIELD(lcm.map_points)),
 
       text("can.interface", FIELD(can.interface)),
+      enumeration("can.frame", {"map", "odom"}, FIELD(can.frame)),
 
       integer("pyramid.levels", "levels", 1, 16, FIELD(estimator.pyramid.levels)),
       number("pyramid.scale_factor", "", 1.05, 2, FIELD(estimator.pyramid.scale_factor)),

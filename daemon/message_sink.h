@@ -18,6 +18,8 @@ class MessageSink {
   virtual ~MessageSink() = default;
   virtual void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) = 0;
   [[nodiscard]] virtual std::uint64_t errors() const = 0;
+  // Logs also keep the results of a whole run, which are too long for the network.
+  [[nodiscard]] virtual bool is_log() const = 0;
 };
 
 // Into a log; the event's time is the message's utime.
@@ -27,6 +29,7 @@ class LogMessageSink final : public MessageSink {
   explicit LogMessageSink(ipc::LogWriter* log) : log_(log) {}
   void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] std::uint64_t errors() const override { return errors_; }
+  [[nodiscard]] bool is_log() const override { return true; }
 
  private:
   ipc::LogWriter* log_;
@@ -45,6 +48,7 @@ class LcmMessageSink final : public MessageSink {
 
   void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] std::uint64_t errors() const override { return errors_; }
+  [[nodiscard]] bool is_log() const override { return false; }
 
  private:
   explicit LcmMessageSink(lcm_t* lcm) : lcm_(lcm) {}

@@ -10,4 +10,10 @@ void Publisher::on_frame(const FrameOutput& frame) {
   if (frame.valid) publish(ipc::kBotCorePoseChannel, utime, make_bot_core_pose(frame));
 }
 
+std::uint64_t Publisher::errors(bool of_logs) const {
+  std::uint64_t sum = 0;
+  for (const auto& sink : sinks_) sum += sink->is_log() == of_logs ? sink->errors() : 0;
+  return sum;
+}
+
 }  // namespace farpoint::daemon

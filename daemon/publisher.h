@@ -26,8 +26,22 @@ class Publisher final : public PoseSink {
     ipc::encode(message, &bytes_);
     for (const auto& sink : sinks_) sink->send(channel, utime, bytes_);
   }
+  // Results of a whole run: into logs only.
+  template <typename Message>
+  void publish_result(const char* channel, std::int64_t utime, const Message& message) {
+    ipc::encode(message, &bytes_);
+    for (const auto& sink : sinks_) {
+      if (sink->is_log()) sink->send(channel, utime, bytes_);
+    }
+  }
+
+  // Messages that could not be sent or stored so far.
+  [[nodiscard]] std::uint64_t log_errors() const { return errors(true); }
+  [[nodiscard]] std::uint64_t network_errors() const { return errors(false); }
 
  private:
+  [[nodiscard]] std::uint64_t errors(bool of_logs) const;
+
   std::vector<std::unique_ptr<MessageSink>> sinks_;
   std::vector<std::uint8_t> bytes_;  // keeps its capacity from message to message
 };
