@@ -1,0 +1,37 @@
+// CAN logs in the format of `candump -L`: "(seconds.micros) interface ID#HEXDATA".
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "ipc/can_frame.h"
+#include "ipc/output_file.h"
+
+namespace farpoint::ipc {
+
+class CandumpWriter {
+ public:
+  // "-" is standard output. Throws std::runtime_error naming the file where it cannot be written.
+  CandumpWriter(std::string path, std::string interface);
+
+  // One line a frame, all with this time. Precondition: utime >= 0.
+  void write(std::int64_t utime, std::span<const CanFrame> frames);
+  // Puts the file in its place. Throws std::runtime_error where anything was not stored (disk full).
+  void close() { file_.close(); }
+
+ private:
+  OutputFile file_;
+  std::string interface_;
+};
+
+struct CandumpLine {
+  std::int64_t utime = 0;
+  std::string_view interface;  // within the parsed line
+  CanFrame frame;
+};
+// False where the line is not one classic frame with an 11-bit identifier.
+[[nodiscard]] bool parse_candump_line(std::string_view line, CandumpLine* out);
+
+}  // namespace farpoint::ipc

@@ -1,0 +1,384 @@
+#include "ipc/can_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <set>
+#include <sstream>
+
+#include "farpoint/status_t.hpp"
+#include "ipc/candump.h"
+#include "tests/ipc/dbc.h"
+#include "tests/ipc/scratch.h"
+
+namespace farpoint::ipc {
+namespace {
+
+using test::DbcMessage;
+using test::DbcSignal;
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+const std::string kDbcPath = std::string(FARPOINT_SOURCE_DIR) + "/config/farpoint.dbc";
+
+const std::map<std::uint32_t, DbcMessage>& dbc() {
+  static const auto messages = test::read_dbc(kDbcPath);
+  return messages;
+}
+
+// All signals of an epoch by name, decoded with the DBC alone. NaN: not available.
+std::map<std::string, double> decoded(const CanEpoch& frames) {
+  std::map<std::string, double> out;
+  for (const CanFrame& frame : frames) {
+    for (const auto& [name, signal] : dbc().at(frame.id).signals) out[name] = signal.value(frame);
+  }
+  return out;
+}
+
+OdometryEpoch random_epoch(std::mt19937_64& rng) {
+  const auto uniform = [&rng](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(rng);
+  };
+  OdometryEpoch e;
+  e.state = static_cast<std::uint8_t>(rng() % 8);
+  e.scale_state = static_cast<std::uint8_t>(1 + rng() % 2);
+  e.pose_valid = e.velocity_valid = true;
+  e.from_vision = rng() % 2 == 0;
+  e.map_frame = rng() % 2 == 0;
+  e.reset_counter = static_cast<std::uint32_t>(rng() % 256);
+  e.map_id = static_cast<std::int32_t>(rng() % 64);
+  e.quality = static_cast<int>(rng() % 101);
+  e.age_s = uniform(0, 0.13);
+  for (auto& p : e.position_m) p = uniform(-83886, 83886);
+  e.heading_rad = uniform(-std::numbers::pi, std::numbers::pi);
+  e.roll_rad = uniform(-std::numbers::pi, std::numbers::pi);
+  e.pitch_rad = uniform(-std::numbers::pi / 2, std::numbers::pi / 2);
+  for (auto& v : e.velocity_m_s) v = uniform(-163, 163);
+  e.yaw_rate_rad_s = uniform(-28, 28);
+  for (auto& s : e.sigma_position_m) s = uniform(0, 65);
+  e.sigma_heading_rad = uniform(0, 1.1);
+  e.sigma_roll_rad = uniform(0, 1.1);
+  e.sigma_pitch_rad = uniform(0, 1.1);
+  for (auto& s : e.sigma_velocity_m_s) s = uniform(0, 40);
+  e.sigma_yaw_rate_rad_s = uniform(0, 0.7);
+  return e;
+}
+
+// What each signal must show, and how coarse it may be: half a step, or one step up for ages and deviations.
+struct Expected {
+  double value, below, above;
+};
+
+std::map<std::string, Expected> expected(const OdometryEpoch& e) {
+  std::map<std::string, Expected> out;
+  const auto exact = [&](const std::string& name, double value) { out[name] = {value, 0, 0}; };
+  const auto nearest = [&](const std::string& name, double value, double step) {
+    out[name] = {value, step / 2 * 1.0001, step / 2 * 1.0001};
+  };
+  const auto upward = [&](const std::string& name, double value, double step) {
+    out[name] = {value, 1e-6 * step + 1e-12, step};
+  };
+  exact("State", e.state);
+  exact("ScaleState", e.scale_state);
+  exact("PoseValid", e.pose_valid ? 1 : 0);
+  exact("VelocityValid", e.velocity_valid ? 1 : 0);
+  exact("ResetCounter", e.reset_counter);
+  exact("Quality", e.quality);
+  exact("FromVision", e.from_vision ? 1 : 0);
+  exact("Frame", e.map_frame ? 1 : 0);
+  exact("MapId", e.map_id);
+  upward("Age", e.age_s, 0.0001);
+  upward("AgeCoarse", e.age_s, 0.01);
+  const std::string axes = "XYZ";
+  for (std::size_t i = 0; i < 3; ++i) {
+    nearest(std::string("Position") + axes[i], e.position_m[i], 0.01);
+    nearest(std::string("Velocity") + axes[i], e.velocity_m_s[i], 0.005);
+    upward(std::string("SigmaPosition") + axes[i], e.sigma_position_m[i], 0.001);
+    upward(std::string("SigmaVelocity") + axes[i], e.sigma_velocity_m_s[i], 0.01);
+  }
+  nearest("Heading", e.heading_rad / kRadians, 0.01);
+  nearest("Roll", e.roll_rad / kRadians, 0.01);
+  nearest("Pitch", e.pitch_rad / kRadians, 0.01);
+  nearest("YawRate", e.yaw_rate_rad_s / kRadians, 0.05);
+  upward("SigmaHeading", e.sigma_heading_rad / kRadians, 0.001);
+  upward("SigmaRoll", e.sigma_roll_rad / kRadians, 0.001);
+  upward("SigmaPitch", e.sigma_pitch_rad / kRadians, 0.001);
+  upward("SigmaYawRate", e.sigma_yaw_rate_rad_s / kRadians, 0.01);
+  return out;
+}
+
+void expect_all(const std::map<std::string, double>& got, const OdometryEpoch& epoch) {
+  for (const auto& [name, want] : expected(epoch)) {
+    ASSERT_TRUE(got.contains(name)) << name;
+    EXPECT_GE(got.at(name), want.value - want.below) << name;
+    EXPECT_LE(got.at(name), want.value + want.above) << name;
+  }
+}
+
+TEST(Dbc, EveryFrameIsDescribedAndNothingElse) {
+  ASSERT_EQ(dbc().size(), kCanFramesPerEpoch);
+  std::set<int> data_ids;
+  for (std::size_t i = 0; i < kCanFramesPerEpoch; ++i) {
+    const auto message = static_cast<CanMessage>(i);
+    ASSERT_TRUE(dbc().contains(can_id(message)));
+    EXPECT_EQ(dbc().at(can_id(message)).size, 8U);
+    EXPECT_EQ(dbc().at(can_id(message)).data_id, can_data_id(message));
+    data_ids.insert(can_data_id(message));
+  }
+  EXPECT_EQ(data_ids.size(), kCanFramesPerEpoch);  // one Data ID a frame
+}
+
+TEST(Dbc, SignalsDoNotOverlapAndStayWithinTheFrame) {
+  for (const auto& [id, message] : dbc()) {
+    std::set<unsigned> used;
+    for (const auto& [name, signal] : message.signals) {
+      for (unsigned bit = signal.start; bit < signal.start + signal.length; ++bit) {
+        EXPECT_LT(bit, 64U) << message.name << " " << name;
+        EXPECT_TRUE(used.insert(bit).second) << message.name << " " << name << " bit " << bit;
+      }
+    }
+    EXPECT_TRUE(message.signals.contains("CRC") && message.signals.contains("Counter") &&
+                message.signals.contains("AgeCoarse"))
+        << message.name;
+  }
+}
+
+TEST(Dbc, TheRangeOfEverySignalIsWhatItsBitsCanSay) {
+  for (const auto& [id, message] : dbc()) {
+    for (const auto& [name, signal] : message.signals) {
+      const double most = std::ldexp(1.0, static_cast<int>(signal.length) - (signal.is_signed ? 1 : 0)) - 1;
+      EXPECT_LE(signal.max, most * signal.factor + 1e-9) << name;
+      EXPECT_GE(signal.min, signal.is_signed ? -most * signal.factor - 1e-9 : 0) << name;
+      for (const auto& [raw, text] : signal.values) {  // no special value lies in the range
+        if (text != "not available" && !text.starts_with("more than")) continue;
+        const double value = static_cast<double>(raw) * signal.factor;
+        EXPECT_TRUE(value > signal.max + 1e-9 || value < signal.min - 1e-9) << name << " " << raw;
+      }
+    }
+  }
+}
+
+TEST(Dbc, NamesOfStatesAreThoseOfTheStatusMessage) {
+  const auto& state = dbc().at(can_id(CanMessage::kStatus)).signals.at("State").values;
+  EXPECT_EQ(state.at(status_t::STATE_STARTING), "starting");
+  EXPECT_EQ(state.at(status_t::STATE_INITIALISING), "initialising");
+  EXPECT_EQ(state.at(status_t::STATE_SETTLING), "settling");
+  EXPECT_EQ(state.at(status_t::STATE_TRACKING), "tracking");
+  EXPECT_EQ(state.at(status_t::STATE_DEGRADED), "degraded");
+  EXPECT_EQ(state.at(status_t::STATE_LOST), "lost");
+  EXPECT_EQ(state.at(status_t::STATE_RELOCALISING), "relocalising");
+  EXPECT_EQ(state.at(status_t::STATE_NO_CAMERA), "no camera");
+  const auto& scale = dbc().at(can_id(CanMessage::kStatus)).signals.at("ScaleState").values;
+  EXPECT_EQ(scale.at(status_t::SCALE_UNKNOWN), "unknown");
+  EXPECT_EQ(scale.at(status_t::SCALE_ASSUMED), "assumed");
+  EXPECT_EQ(scale.at(status_t::SCALE_METRIC), "metric");
+}
+
+TEST(CanCodec, TheDbcGivesEverySignalBack) {
+  std::mt19937_64 rng(1);
+  CanEncoder encoder;
+  for (int i = 0; i < 3000; ++i) {
+    const OdometryEpoch epoch = random_epoch(rng);
+    expect_all(decoded(encoder.encode(epoch)), epoch);
+    if (testing::Test::HasFailure()) break;
+  }
+}
+
+TEST(CanCodec, FramesOfAnEpochShareTheCounterAndPassE2e) {
+  std::mt19937_64 rng(2);
+  CanEncoder encoder;
+  std::vector<E2eChecker> checkers;
+  for (std::size_t i = 0; i < kCanFramesPerEpoch; ++i) {
+    checkers.emplace_back(can_data_id(static_cast<CanMessage>(i)));
+  }
+  for (int n = 0; n < 40; ++n) {
+    const CanEpoch frames = encoder.encode(random_epoch(rng));
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      EXPECT_EQ(frames[i].id, can_id(static_cast<CanMessage>(i)));
+      EXPECT_EQ(frames[i].size, 8);
+      EXPECT_EQ(frames[i].data[1] & 0x0f, n % 15);
+      EXPECT_EQ(checkers[i].check(frames[i]), E2eStatus::kOk);
+    }
+  }
+}
+
+void expect_available(const std::map<std::string, double>& got, const std::vector<std::string>& names,
+                      bool want) {
+  for (const std::string& name : names) EXPECT_EQ(!std::isnan(got.at(name)), want) << name;
+}
+
+const std::vector<std::string> kPositionSignals = {"PositionX",      "PositionY",      "PositionZ",
+                                                   "SigmaPositionX", "SigmaPositionY", "SigmaPositionZ"};
+const std::vector<std::string> kAngleSignals = {"Heading",      "Roll",      "Pitch",
+                                                "SigmaHeading", "SigmaRoll", "SigmaPitch"};
+const std::vector<std::string> kVelocitySignals = {"VelocityX",      "VelocityY",      "VelocityZ",
+                                                   "SigmaVelocityX", "SigmaVelocityY", "SigmaVelocityZ"};
+const std::vector<std::string> kYawRateSignals = {"YawRate", "SigmaYawRate"};
+
+TEST(CanCodec, WithoutScaleNoPositionAndNoVelocity) {
+  std::mt19937_64 rng(3);
+  OdometryEpoch epoch = random_epoch(rng);
+  for (const std::uint8_t scale :
+       {std::uint8_t{0}, std::uint8_t{3}}) {  // unknown, and one that does not exist
+    epoch.scale_state = scale;
+    const auto got = decoded(CanEncoder().encode(epoch));
+    expect_available(got, kPositionSignals, false);
+    expect_available(got, kVelocitySignals, false);
+    expect_available(got, kAngleSignals, true);
+    expect_available(got, kYawRateSignals, true);
+    EXPECT_EQ(got.at("ScaleState"), scale);
+    EXPECT_FALSE(std::isnan(got.at("Age")));
+  }
+}
+
+TEST(CanCodec, AnInvalidPoseSendsNoPoseButItsAgeAndState) {
+  std::mt19937_64 rng(4);
+  OdometryEpoch epoch = random_epoch(rng);
+  epoch.pose_valid = false;
+  epoch.state = status_t::STATE_LOST;
+  const auto got = decoded(CanEncoder().encode(epoch));
+  expect_available(got, kPositionSignals, false);
+  expect_available(got, kAngleSignals, false);
+  expect_available(got, kVelocitySignals, true);
+  EXPECT_EQ(got.at("PoseValid"), 0);
+  EXPECT_EQ(got.at("State"), 5);
+  EXPECT_NEAR(got.at("Age"), epoch.age_s, 1e-4);
+  epoch.velocity_valid = false;
+  const auto nothing = decoded(CanEncoder().encode(epoch));
+  expect_available(nothing, kVelocitySignals, false);
+  expect_available(nothing, kYawRateSignals, false);
+}
+
+TEST(CanCodec, BeyondItsRangeAValueIsNotAvailableAndNeverWraps) {
+  OdometryEpoch epoch;
+  epoch.pose_valid = epoch.velocity_valid = true;
+  epoch.scale_state = status_t::SCALE_METRIC;
+  epoch.position_m = {83886.07, -83886.07, 83886.08};
+  auto got = decoded(CanEncoder().encode(epoch));
+  EXPECT_NEAR(got.at("PositionX"), 83886.07, 1e-6);
+  EXPECT_NEAR(got.at("PositionY"), -83886.07, 1e-6);
+  EXPECT_TRUE(std::isnan(got.at("PositionZ")));
+  for (const double wild : {-83886.08, 167772.16, 1e9, -1e30, 1e300, kInfinity, -kInfinity, kNan}) {
+    epoch.position_m = {wild, 1, 2};
+    epoch.velocity_m_s = {1, wild, 2};
+    epoch.yaw_rate_rad_s = wild;
+    got = decoded(CanEncoder().encode(epoch));
+    EXPECT_TRUE(std::isnan(got.at("PositionX"))) << wild;
+    EXPECT_EQ(got.at("PositionY"), 1) << wild;
+    EXPECT_TRUE(std::isnan(got.at("VelocityY"))) << wild;
+    EXPECT_TRUE(std::isnan(got.at("YawRate"))) << wild;
+  }
+}
+
+TEST(CanCodec, AnglesAreWrapped) {
+  OdometryEpoch epoch;
+  epoch.pose_valid = true;
+  for (const double turns : {-3.0, -1.0, 0.0, 1.0, 20.0}) {
+    epoch.heading_rad = (170 + 360 * turns) * kRadians;
+    epoch.roll_rad = (-179.996 + 360 * turns) * kRadians;
+    const auto got = decoded(CanEncoder().encode(epoch));
+    EXPECT_NEAR(got.at("Heading"), 170, 0.0051);
+    EXPECT_NEAR(got.at("Roll"), -180, 0.0051);
+  }
+  epoch.heading_rad = kNan;
+  EXPECT_TRUE(std::isnan(decoded(CanEncoder().encode(epoch)).at("Heading")));
+}
+
+TEST(CanCodec, AgesAndDeviationsSaturateAndTellWhatTheyDoNotKnow) {
+  OdometryEpoch epoch;
+  epoch.pose_valid = epoch.velocity_valid = true;
+  epoch.scale_state = status_t::SCALE_METRIC;
+  const DbcMessage& status = dbc().at(can_id(CanMessage::kStatus));
+  const DbcMessage& sigma = dbc().at(can_id(CanMessage::kPositionSigma));
+  const auto text = [](const DbcSignal& signal, const CanFrame& frame) {
+    const auto it = signal.values.find(signal.raw(frame));
+    return it == signal.values.end() ? std::string() : it->second;
+  };
+  epoch.age_s = 100;
+  epoch.sigma_position_m = {1e9, -1, kNan};
+  const CanEpoch late = CanEncoder().encode(epoch);
+  EXPECT_EQ(text(status.signals.at("Age"), late[0]), "more than 6.5533 s");
+  EXPECT_EQ(text(status.signals.at("AgeCoarse"), late[0]), "more than 0.13 s");
+  EXPECT_EQ(text(sigma.signals.at("SigmaPositionX"), late[5]), "more than 65.533 m");
+  EXPECT_EQ(text(sigma.signals.at("SigmaPositionY"), late[5]), "not available");
+  EXPECT_EQ(text(sigma.signals.at("SigmaPositionZ"), late[5]), "not available");
+  for (const double unknown : {-0.001, kNan, kInfinity}) {
+    epoch.age_s = unknown;
+    const auto got = decoded(CanEncoder().encode(epoch));
+    EXPECT_TRUE(std::isnan(got.at("Age")) && std::isnan(got.at("AgeCoarse"))) << unknown;
+  }
+}
+
+TEST(CanCodec, EulerAnglesOfKnownRotations) {
+  const double h = std::sqrt(0.5);
+  EXPECT_NEAR(euler_angles({h, 0, 0, h}).heading_rad, std::numbers::pi / 2, 1e-12);
+  EXPECT_NEAR(euler_angles({h, h, 0, 0}).roll_rad, std::numbers::pi / 2, 1e-12);
+  EXPECT_NEAR(euler_angles({h, 0, h, 0}).pitch_rad, std::numbers::pi / 2, 1e-7);
+  std::mt19937_64 rng(5);
+  std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+  for (int i = 0; i < 200; ++i) {
+    const double a = uniform(rng), b = uniform(rng), c = uniform(rng);
+    // Rz(a) Ry(b) Rx(c) as a product of quaternions.
+    const double ca = std::cos(a / 2), sa = std::sin(a / 2), cb = std::cos(b / 2), sb = std::sin(b / 2),
+                 cc = std::cos(c / 2), sc = std::sin(c / 2);
+    const EulerAngles got = euler_angles({ca * cb * cc + sa * sb * sc, ca * cb * sc - sa * sb * cc,
+                                          ca * sb * cc + sa * cb * sc, sa * cb * cc - ca * sb * sc});
+    EXPECT_NEAR(got.heading_rad, a, 1e-9);
+    EXPECT_NEAR(got.pitch_rad, b, 1e-9);
+    EXPECT_NEAR(got.roll_rad, c, 1e-9);
+  }
+}
+
+// The independent decoder: npm's candied, which gets the DBC file and the log and nothing else.
+TEST(CanCodec, AnIndependentDecoderGivesEverySignalBack) {
+  const test::Scratch scratch;
+  std::mt19937_64 rng(6);
+  std::vector<OdometryEpoch> epochs;
+  CanEncoder encoder;
+  CandumpWriter writer(scratch.path("a.candump"), "can0");
+  for (int i = 0; i < 200; ++i) {
+    epochs.push_back(random_epoch(rng));
+    epochs.back().scale_state = i % 4 == 0 ? 0 : 1;
+    writer.write(1000 * i, encoder.encode(epochs.back()));
+  }
+  writer.close();
+  const std::string command = std::string(FARPOINT_SOURCE_DIR) + "/tests/ipc/candied/decode " + kDbcPath +
+                              " " + scratch.path("a.candump") + " > " + scratch.path("a.csv");
+  const int status = std::system(command.c_str());
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no node or npm on this machine";
+  ASSERT_EQ(status, 0) << command;
+
+  std::vector<std::map<std::string, double>> got(epochs.size());
+  std::ifstream csv(scratch.path("a.csv"));
+  std::string line;
+  ASSERT_TRUE(std::getline(csv, line));
+  while (std::getline(csv, line)) {
+    std::istringstream fields(line);
+    std::string utime, message, signal, value;
+    std::getline(fields, utime, ',');
+    std::getline(fields, message, ',');
+    std::getline(fields, signal, ',');
+    std::getline(fields, value, ',');
+    got.at(std::stoul(utime) / 1000)[signal] = value.empty() ? kNan : std::stod(value);
+  }
+  for (std::size_t i = 0; i < epochs.size(); ++i) {
+    if (epochs[i].scale_state != 0) {
+      expect_all(got[i], epochs[i]);
+    } else {
+      expect_available(got[i], kPositionSignals, false);
+      expect_available(got[i], kVelocitySignals, false);
+      expect_available(got[i], kAngleSignals, true);
+    }
+    EXPECT_EQ(got[i].at("Counter"), static_cast<double>(i % 15));
+    if (testing::Test::HasFailure()) break;
+  }
+}
+
+}  // namespace
+}  // namespace farpoint::ipc
