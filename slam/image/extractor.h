@@ -9,13 +9,14 @@
 namespace farpoint::slam {
 
 struct ExtractorOptions {
-  int features = 1500;           // wanted over all levels; never exceeded
-  int fast_threshold = 20;       // grey levels; first try in every cell
-  int fast_threshold_min = 7;    // grey levels; second try in a cell that found nothing
-  int cell_px = 32;              // side of a cell of the corner grid, level pixels
+  int features = 1500;         // wanted over all levels; never exceeded
+  int fast_threshold = 20;     // grey levels; first try in every cell
+  int fast_threshold_min = 7;  // grey levels; second try in a cell that found nothing
+  int cell_px = 32;            // side of a cell of the corner grid, level pixels
 };
 
-// Working memory is allocated in the constructor; extract() allocates nothing (after the set has its capacity).
+// Working memory is allocated in the constructor; extract() allocates nothing (after the set has its
+// capacity).
 class Extractor {
  public:
   Extractor(int width_px, int height_px, const PyramidOptions& pyramid, const ExtractorOptions& options);
@@ -23,8 +24,9 @@ class Extractor {
   Extractor(const Extractor&) = delete;
   Extractor& operator=(const Extractor&) = delete;
 
-  // Corners of all levels into *out, ordered by level, then row-major by cell. `mask` (same size as level 0, may be
-  // empty): pixels with 0 give no corner. Features are spread over the image: no region may take the quota of another.
+  // Corners of all levels into *out, ordered by level, then row-major by cell. `mask` (same size as level 0,
+  // may be empty): pixels with 0 give no corner. Features are spread over the image: no region may take the
+  // quota of another.
   void extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out);
 
  private:

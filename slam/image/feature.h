@@ -34,14 +34,14 @@ struct Descriptor {
 // u_px = (level pixel + 0.5) * scale - 0.5 and the patch around it is a plain copy.
 struct Feature {
   float u_px = 0, v_px = 0;
-  float angle_rad = 0;        // orientation of the patch (intensity centroid), -pi..pi
-  float score = 0;            // corner strength, larger is stronger
-  std::uint8_t level = 0;     // pyramid level, 0 is full resolution
+  float angle_rad = 0;     // orientation of the patch (intensity centroid), -pi..pi
+  float score = 0;         // corner strength, larger is stronger
+  std::uint8_t level = 0;  // pyramid level, 0 is full resolution
 };
 
 // The surroundings of a corner on its pyramid level: kSize x kSize pixels, row-major, the corner at index
-// (kCentre, kCentre). To the estimator it is an opaque payload: only the FrameImage that made it (or one of the same
-// kind) reads it.
+// (kCentre, kCentre). To the estimator it is an opaque payload: only the FrameImage that made it (or one of
+// the same kind) reads it.
 struct Patch {
   static constexpr int kSize = 16;
   static constexpr int kCentre = 8;
@@ -52,29 +52,31 @@ struct Patch {
 // Outcome of the alignment of a host patch with an image.
 struct Alignment {
   bool ok = false;
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();    // level-0 pixel of the host's corner in this image
-  float sigma_px = 0;                                 // expected error of `pixel`, level-0 pixels, 1 sigma
-  float zncc = 0;                                     // zero-mean normalised cross correlation at the end, -1..1
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level-0 pixel of the host's corner in this image
+  float sigma_px = 0;                               // expected error of `pixel`, level-0 pixels, 1 sigma
+  float zncc = 0;  // zero-mean normalised cross correlation at the end, -1..1
 };
 
-// Corners and descriptors of one image, in one fixed order (deterministic); both vectors have the same length and
-// keep their capacity from frame to frame.
+// Corners and descriptors of one image, in one fixed order (deterministic); both vectors have the same length
+// and keep their capacity from frame to frame.
 struct FeatureSet {
   std::vector<Feature> features;
   std::vector<Descriptor> descriptors;
 };
 
 // The pixels behind a frame, as far as the estimator needs them. Two kinds exist: a pyramid of a real image
-// (PyramidImage), and the feature-level simulator of the tests, which computes what alignment would have measured.
+// (PyramidImage), and the feature-level simulator of the tests, which computes what alignment would have
+// measured.
 class FrameImage {
  public:
   virtual ~FrameImage() = default;
   // Copy of the surroundings of feature `index` of this image. False where it is too close to the edge.
   [[nodiscard]] virtual bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const = 0;
-  // Aligns `host` with this image. `A_target_host`: derivative of this image's level-0 pixel by the host image's
-  // level-0 pixel (2x2) at the corner; `predicted_px`: where to start. Inverse compositional, translation + gain +
-  // offset, on the pyramid level of this image on which the warped patch has about its own resolution. Not ok where
-  // it leaves the image, does not converge, moves further than max_shift_px (level-0), or correlates badly.
+  // Aligns `host` with this image. `A_target_host`: derivative of this image's level-0 pixel by the host
+  // image's level-0 pixel (2x2) at the corner; `predicted_px`: where to start. Inverse compositional,
+  // translation + gain + offset, on the pyramid level of this image on which the warped patch has about its
+  // own resolution. Not ok where it leaves the image, does not converge, moves further than max_shift_px
+  // (level-0), or correlates badly.
   [[nodiscard]] virtual Alignment align(const Patch& host, const Eigen::Matrix2f& A_target_host,
                                         const Eigen::Vector2f& predicted_px, float max_shift_px) const = 0;
 };

@@ -14,7 +14,8 @@ FeatureGrid::FeatureGrid(int width_px, int height_px, int cell_px, std::size_t m
 }
 
 int FeatureGrid::clamp_column(float u_px) const {
-  return static_cast<int>(std::clamp(std::floor(u_px * inverse_cell_), 0.0F, static_cast<float>(columns_ - 1)));
+  return static_cast<int>(
+      std::clamp(std::floor(u_px * inverse_cell_), 0.0F, static_cast<float>(columns_ - 1)));
 }
 
 int FeatureGrid::clamp_row(float v_px) const {

@@ -16,11 +16,11 @@ class FeatureGrid {
   // Sorts the features into cells (counting sort, stable: ascending index within a cell).
   void build(const std::vector<Feature>& features);
 
-  // Calls visit(index) for every feature within radius_px (square window) of (u, v) and with min_level <= level <=
-  // max_level, in a fixed order.
+  // Calls visit(index) for every feature within radius_px (square window) of (u, v) and with min_level <=
+  // level <= max_level, in a fixed order.
   template <typename Visitor>
-  void visit_near(const std::vector<Feature>& features, float u_px, float v_px, float radius_px, int min_level,
-                  int max_level, Visitor&& visit) const {
+  void visit_near(const std::vector<Feature>& features, float u_px, float v_px, float radius_px,
+                  int min_level, int max_level, Visitor&& visit) const {
     if (starts_.empty()) return;
     const int x0 = clamp_column(u_px - radius_px), x1 = clamp_column(u_px + radius_px);
     const int y0 = clamp_row(v_px - radius_px), y1 = clamp_row(v_px + radius_px);
@@ -44,7 +44,7 @@ class FeatureGrid {
 
   int columns_ = 0, rows_ = 0;
   float inverse_cell_ = 0;
-  std::vector<std::uint32_t> starts_;     // first entry of each cell in indices_, columns*rows + 1 values
+  std::vector<std::uint32_t> starts_;  // first entry of each cell in indices_, columns*rows + 1 values
   std::vector<std::uint32_t> indices_;
 };
 

@@ -9,11 +9,11 @@ namespace farpoint::slam {
 
 struct PyramidOptions {
   int levels = 8;
-  double scale_factor = 1.2;    // size ratio of neighbouring levels
+  double scale_factor = 1.2;  // size ratio of neighbouring levels
 };
 
-// All levels of one image. Level l has size round(size / scale^l). Level 0 is a copy of the input (the input belongs to
-// a driver). Allocation happens in the constructor only.
+// All levels of one image. Level l has size round(size / scale^l). Level 0 is a copy of the input (the input
+// belongs to a driver). Allocation happens in the constructor only.
 class Pyramid {
  public:
   Pyramid(int width_px, int height_px, const PyramidOptions& options);
@@ -22,7 +22,7 @@ class Pyramid {
 
   [[nodiscard]] int levels() const;
   [[nodiscard]] ImageView level(int l) const;
-  [[nodiscard]] float scale(int l) const;    // level-0 pixels a pixel of level l
+  [[nodiscard]] float scale(int l) const;  // level-0 pixels a pixel of level l
   [[nodiscard]] std::size_t bytes() const;
 
  private:

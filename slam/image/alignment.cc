@@ -1,0 +1,259 @@
+// PyramidImage: patches and their alignment (inverse compositional Lucas-Kanade; Baker & Matthews, IJCV
+// 2004).
+//
+// Both the host patch and the image are read through the same quadratic B-spline smoothing. Linear
+// interpolation blurs by an amount that depends on the sub-pixel position, which pulls the minimum towards
+// whole pixels; this spline shifts nothing and blurs by a variance of 1/4 px^2 at every position.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "slam/image/pyramid.h"
+
+namespace farpoint::slam {
+namespace {
+
+constexpr int kSide = 8;  // template side, target level pixels
+constexpr int kCount = kSide * kSide;
+constexpr float kFirst = -(kSide - 1) / 2.0F;  // offset of the first template pixel from its centre
+constexpr int kMaxIterations = 10;
+constexpr float kConverged = 0.01F;  // level pixels: a tenth of the best measurement's error
+constexpr float kMaxStep = 1.0F;     // level pixels an iteration: the linearisation holds no further
+// Beyond this the patch and the image differ too much in resolution for each other even at the best level.
+constexpr float kMaxScale = 2.2F;
+// From here on one sample a template pixel would miss pixels of the patch: four are averaged.
+constexpr float kSupersampleScale = 1.3F;
+// What is the same surface correlates better than this; chance and occlusion mostly do not.
+constexpr float kMinZncc = 0.7F;
+// Grey levels, 1 sigma, of noise the residual cannot show: quantisation, and what 64 pixels may have hidden.
+constexpr float kMinNoise = 1.0F;
+// Measured (tests/image/alignment_test.cc): error that texture and noise do not explain, level pixels.
+constexpr float kSigmaFloor = 0.05F;
+// The error of the worst direction, level pixels, above which the position along it is not known.
+constexpr float kMaxSigma = 0.5F;
+
+struct SplineWeights {
+  float value[3], slope[3];
+};
+
+// Weights of the pixels nearest - 1, nearest, nearest + 1 at offset t from the nearest, |t| <= 0.5.
+SplineWeights spline(float t) {
+  return {{0.5F * (0.5F - t) * (0.5F - t), 0.75F - t * t, 0.5F * (0.5F + t) * (0.5F + t)},
+          {t - 0.5F, -2 * t, t + 0.5F}};
+}
+
+int nearest_pixel(float x) {
+  return static_cast<int>(std::floor(x + 0.5F));
+}
+
+using Window = std::array<float, kCount>;
+
+// The warped host patch: values and derivatives by the target level's pixel.
+struct Template {
+  Window value, dx, dy;
+};
+
+// Adds value and gradient of the patch at host pixel (x, y), which the caller has checked.
+void sample_patch(const Patch& patch, float x, float y, float* value, Eigen::Vector2f* gradient) {
+  const int ix = nearest_pixel(x), iy = nearest_pixel(y);
+  const SplineWeights wx = spline(x - static_cast<float>(ix)), wy = spline(y - static_cast<float>(iy));
+  const std::uint8_t* row = patch.pixels.data() + (iy - 1) * Patch::kSize + ix - 1;
+  for (int k = 0; k < 3; ++k, row += Patch::kSize) {
+    const float p0 = row[0], p1 = row[1], p2 = row[2];
+    const float along = wx.value[0] * p0 + wx.value[1] * p1 + wx.value[2] * p2;
+    const float slope = wx.slope[0] * p0 + wx.slope[1] * p1 + wx.slope[2] * p2;
+    *value += wy.value[k] * along;
+    gradient->x() += wy.value[k] * slope;
+    gradient->y() += wy.slope[k] * along;
+  }
+}
+
+// `B` maps an offset in target level pixels to one in host level pixels. False if the template leaves the
+// patch.
+bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
+  const float largest = B.norm();  // at least the largest singular value
+  const bool fine = largest > kSupersampleScale * std::sqrt(2.0F);
+  const float sub = fine ? 0.25F : 0.0F;
+  const float reach = -kFirst + sub;
+  // The spline reads one pixel around the nearest: positions 0.5 .. 14.5 are inside, the corner is at 8.
+  constexpr float kReach = Patch::kSize - 1.5F - Patch::kCentre;
+  if ((B.cwiseAbs() * Eigen::Vector2f(reach, reach)).maxCoeff() >= kReach) return false;
+  const int samples = fine ? 2 : 1;
+  const float share = 1.0F / static_cast<float>(samples * samples);
+  for (int i = 0; i < kCount; ++i) {
+    const Eigen::Vector2f d(kFirst + static_cast<float>(i % kSide), kFirst + static_cast<float>(i / kSide));
+    float value = 0;
+    Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
+    for (int s = 0; s < samples * samples; ++s) {
+      const Eigen::Vector2f shift((s & 1) != 0 ? sub : -sub, (s & 2) != 0 ? sub : -sub);
+      const Eigen::Vector2f p = B * (d + shift) + Eigen::Vector2f::Constant(Patch::kCentre);
+      sample_patch(patch, p.x(), p.y(), &value, &gradient);
+    }
+    const Eigen::Vector2f by_target = B.transpose() * gradient * share;
+    const auto index = static_cast<std::size_t>(i);
+    t->value[index] = value * share;
+    t->dx[index] = by_target.x();
+    t->dy[index] = by_target.y();
+  }
+  return true;
+}
+
+// The image around (x, y), at the offsets of the template. False if it leaves the image.
+bool sample_window(const ImageView& image, float x, float y, Window* out) {
+  const float x0 = x + kFirst, y0 = y + kFirst;
+  // Written so that NaN fails.
+  if (!(x0 >= 0.5F && y0 >= 0.5F && x0 + kSide < static_cast<float>(image.width_px) - 0.5F &&
+        y0 + kSide < static_cast<float>(image.height_px) - 0.5F)) {
+    return false;
+  }
+  const int ix = nearest_pixel(x0), iy = nearest_pixel(y0);
+  const SplineWeights wx = spline(x0 - static_cast<float>(ix)), wy = spline(y0 - static_cast<float>(iy));
+  float rows[kSide + 2][kSide];
+  for (int r = 0; r < kSide + 2; ++r) {
+    const std::uint8_t* p =
+        image.data + static_cast<std::ptrdiff_t>(iy - 1 + r) * image.stride_bytes + ix - 1;
+    for (int c = 0; c < kSide; ++c) {
+      rows[r][c] = wx.value[0] * static_cast<float>(p[c]) + wx.value[1] * static_cast<float>(p[c + 1]) +
+                   wx.value[2] * static_cast<float>(p[c + 2]);
+    }
+  }
+  for (int r = 0; r < kSide; ++r) {
+    for (int c = 0; c < kSide; ++c) {
+      (*out)[static_cast<std::size_t>(r * kSide + c)] =
+          wy.value[0] * rows[r][c] + wy.value[1] * rows[r + 1][c] + wy.value[2] * rows[r + 2][c];
+    }
+  }
+  return true;
+}
+
+float dot(const Window& a, const Window& b) {
+  // Four running sums: the order is fixed, and the compiler may use vectors.
+  float sum[4] = {};
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    for (std::size_t k = 0; k < 4; ++k) sum[k] += a[i + k] * b[i + k];
+  }
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+void subtract_mean(Window* w) {
+  float sum[4] = {};
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    for (std::size_t k = 0; k < 4; ++k) sum[k] += (*w)[i + k];
+  }
+  const float mean = ((sum[0] + sum[1]) + (sum[2] + sum[3])) / kCount;
+  for (float& v : *w) v -= mean;
+}
+
+// Template made free of brightness: the model is image(p + d) = gain * template(d + shift) + offset, and
+// gradients orthogonal to the template and to a constant see the shift alone.
+struct Normalised {
+  Window unit;     // template, zero mean, norm 1
+  Window dx, dy;   // gradients, orthogonal to `unit` and to 1
+  float norm = 0;  // of the zero-mean template
+  Eigen::Matrix2f inverse_hessian;
+};
+
+bool normalise(Template* t, Normalised* n) {
+  subtract_mean(&t->value);
+  n->norm = std::sqrt(dot(t->value, t->value));
+  // Flat: less contrast than the noise.
+  if (!(n->norm > kMinNoise * kSide)) return false;
+  for (std::size_t i = 0; i < kCount; ++i) n->unit[i] = t->value[i] / n->norm;
+  const auto free_of_brightness = [n](Window* gradient, Window* out) {
+    subtract_mean(gradient);
+    const float along = dot(*gradient, n->unit);
+    for (std::size_t i = 0; i < kCount; ++i) (*out)[i] = (*gradient)[i] - along * n->unit[i];
+  };
+  free_of_brightness(&t->dx, &n->dx);
+  free_of_brightness(&t->dy, &n->dy);
+  const float xx = dot(n->dx, n->dx), xy = dot(n->dx, n->dy), yy = dot(n->dy, n->dy);
+  const float determinant = xx * yy - xy * xy;
+  if (!(determinant > 1e-6F * (xx + yy) * (xx + yy))) return false;
+  n->inverse_hessian << yy, -xy, -xy, xx;
+  n->inverse_hessian /= determinant;
+  return true;
+}
+
+float largest_eigenvalue(const Eigen::Matrix2f& m) {
+  const float mean = 0.5F * (m(0, 0) + m(1, 1)), half = 0.5F * (m(0, 0) - m(1, 1));
+  return mean + std::sqrt(half * half + m(0, 1) * m(0, 1));
+}
+
+int best_level(const Pyramid& pyramid, float scale) {
+  int best = 0;
+  for (int l = 1; l < pyramid.levels(); ++l) {
+    // Nearest in the ratio.
+    if (pyramid.scale(l) * pyramid.scale(l - 1) < scale * scale) best = l;
+  }
+  return best;
+}
+
+}  // namespace
+
+bool PyramidImage::extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const {
+  const Feature& f = set.features[index];
+  if (f.level >= pyramid_->levels()) return false;
+  const ImageView image = pyramid_->level(f.level);
+  const float scale = pyramid_->scale(f.level);
+  const int x0 = nearest_pixel((f.u_px + 0.5F) / scale - 0.5F) - Patch::kCentre;
+  const int y0 = nearest_pixel((f.v_px + 0.5F) / scale - 0.5F) - Patch::kCentre;
+  if (x0 < 0 || y0 < 0 || x0 + Patch::kSize > image.width_px || y0 + Patch::kSize > image.height_px)
+    return false;
+  for (int y = 0; y < Patch::kSize; ++y) {
+    std::copy_n(image.data + static_cast<std::ptrdiff_t>(y0 + y) * image.stride_bytes + x0, Patch::kSize,
+                patch->pixels.data() + y * Patch::kSize);
+  }
+  patch->level = f.level;
+  return true;
+}
+
+Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target_host,
+                              const Eigen::Vector2f& predicted_px, float max_shift_px) const {
+  Alignment result;
+  const float determinant = A_target_host.determinant();
+  if (host.level >= pyramid_->levels() || !(determinant > 1e-4F)) return result;
+  const float host_scale = pyramid_->scale(host.level);
+  const int level = best_level(*pyramid_, host_scale * std::sqrt(determinant));
+  const float scale = pyramid_->scale(level);
+  const Eigen::Matrix2f B = A_target_host.inverse() * (scale / host_scale);
+  const float area = B.determinant();
+  if (!(area < kMaxScale * kMaxScale && area * kMaxScale * kMaxScale > 1)) return result;
+
+  Template warped;
+  Normalised host_template;
+  if (!warp_template(host, B, &warped) || !normalise(&warped, &host_template)) return result;
+
+  const ImageView image = pyramid_->level(level);
+  const Eigen::Vector2f half(0.5F, 0.5F);
+  const Eigen::Vector2f start = (predicted_px + half) / scale - half;
+  Eigen::Vector2f p = start;
+  Window window;
+  float gain = 0, variance = 0;
+  bool converged = false;
+  for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
+    if (!sample_window(image, p.x(), p.y(), &window)) return result;
+    subtract_mean(&window);
+    const float along = dot(window, host_template.unit), energy = dot(window, window);
+    gain = along / host_template.norm;
+    result.zncc = energy > 0 ? along / std::sqrt(energy) : 0;
+    // A start half a texture period away shows no or negative correlation: there is no way down from here.
+    if (!(result.zncc > 0.1F)) return result;
+    const Eigen::Vector2f slope(dot(window, host_template.dx), dot(window, host_template.dy));
+    Eigen::Vector2f step = host_template.inverse_hessian * slope / gain;
+    const float length = step.norm();
+    if (length > kMaxStep) step *= kMaxStep / length;
+    p -= step;
+    if (!((p - start).squaredNorm() * scale * scale <= max_shift_px * max_shift_px)) return result;
+    converged = length < kConverged;
+    variance = (energy - along * along) / (kCount - 4);
+  }
+  const float noise = std::max(variance, kMinNoise * kMinNoise);
+  const Eigen::Matrix2f covariance = host_template.inverse_hessian * (noise / (gain * gain));
+  const float sigma = std::sqrt(0.5F * covariance.trace() + kSigmaFloor * kSigmaFloor);
+  result.pixel = (p + half) * scale - half;
+  result.sigma_px = sigma * scale;
+  result.ok = converged && result.zncc >= kMinZncc && largest_eigenvalue(covariance) <= kMaxSigma * kMaxSigma;
+  return result;
+}
+
+}  // namespace farpoint::slam

@@ -1,0 +1,233 @@
+#include "slam/image/extractor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "slam/image/corner_selection.h"
+#include "slam/image/descriptor_pattern.h"
+#include "slam/image/kernels.h"
+
+namespace farpoint::slam {
+namespace {
+
+// Distance of corners from the edge of their level: the patch (15), the blur (3) and one to spare.
+constexpr int kBorder = 19;
+// Blurred pixels exist from here on: a patch around the outermost corner reaches no further.
+constexpr int kBlurBorder = kBorder - kPatchRadiusPx;
+static_assert(kBlurBorder >= 3, "the blur reads three pixels to each side");
+
+const SteeredPattern& steered_pattern() {
+  static const SteeredPattern pattern;
+  return pattern;
+}
+
+std::size_t padded(int width) {
+  return static_cast<std::size_t>((width + 2 * kRowAlignment - 1) / kRowAlignment * kRowAlignment);
+}
+
+struct LevelCorners {
+  std::vector<Corner> corners;
+  int cell_columns = 0, cell_rows = 0;
+};
+
+}  // namespace
+
+struct Extractor::Workspace {
+  Workspace(int width, int height, const PyramidOptions& pyramid_options,
+            const ExtractorOptions& extractor_options);
+
+  void detect(const Pyramid& pyramid, int l, const ImageView& mask);
+  void drop_weak(LevelCorners* level);
+  void choose(const Pyramid& pyramid);
+  void blur(const ImageView& image);
+  void describe(const Pyramid& pyramid, int l, FeatureSet* out);
+
+  [[nodiscard]] std::size_t cell_of(const LevelCorners& level, const Corner& c) const {
+    return static_cast<std::size_t>((c.y / options.cell_px) * level.cell_columns + c.x / options.cell_px);
+  }
+  [[nodiscard]] std::uint8_t* score_row(int y) {
+    return scores.data() + static_cast<std::size_t>(y % 3) * row_stride;
+  }
+  [[nodiscard]] std::uint8_t* blurred_row(int y) {
+    return blurred.data() + static_cast<std::size_t>(y) * row_stride;
+  }
+
+  ExtractorOptions options;
+  const Kernels* kernels = nullptr;  // of the running extract()
+  std::size_t row_stride = 0;        // of all rows below, elements
+  std::vector<LevelCorners> levels;
+  std::vector<double> weights;  // share of each level
+  std::vector<int> available, quota;
+  std::vector<std::uint8_t> scores;     // three rows of FAST scores
+  std::vector<std::uint16_t> maxima;    // one row
+  std::vector<std::uint8_t> cell_best;  // of one level
+  std::vector<std::int16_t> ring;       // seven rows of the blur
+  std::vector<std::uint8_t> blurred;    // one level
+};
+
+Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyramid_options,
+                                const ExtractorOptions& extractor_options)
+    : options(extractor_options) {
+  options.cell_px = std::max(8, options.cell_px);
+  options.fast_threshold_min = std::clamp(options.fast_threshold_min, 1, 255);
+  options.fast_threshold = std::clamp(options.fast_threshold, options.fast_threshold_min, 255);
+  row_stride = padded(width);
+  const std::size_t count = static_cast<std::size_t>(std::max(1, pyramid_options.levels));
+  levels.resize(count);
+  available.resize(count);
+  quota.resize(count);
+  for (std::size_t l = 0; l < count; ++l) {
+    const double scale = std::pow(pyramid_options.scale_factor, static_cast<double>(l));
+    const int w = static_cast<int>(std::lround(width / scale)),
+              h = static_cast<int>(std::lround(height / scale));
+    // No two maxima of 3x3 neighbourhoods lie in the same 2x2 block.
+    levels[l].corners.reserve(static_cast<std::size_t>((w / 2 + 1) * (h / 2 + 1)));
+    levels[l].cell_columns = w / options.cell_px + 1;
+    levels[l].cell_rows = h / options.cell_px + 1;
+    // Between equal density on the level's own pixels (1 / scale^2) and equal numbers.
+    weights.push_back(1 / scale);
+  }
+  scores.assign(3 * row_stride, 0);
+  maxima.assign(row_stride, 0);
+  cell_best.assign(static_cast<std::size_t>(levels[0].cell_columns * levels[0].cell_rows), 0);
+  ring.assign(7 * row_stride, 0);
+  blurred.assign(row_stride * static_cast<std::size_t>(height), 0);
+}
+
+// All maxima above the lower threshold. The score is the highest threshold a corner passes, so that one pass
+// serves both thresholds.
+void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView& mask) {
+  LevelCorners& level = levels[static_cast<std::size_t>(l)];
+  level.corners.clear();
+  const ImageView image = pyramid.level(l);
+  const int begin = kBorder, end = image.width_px - kBorder, last_row = image.height_px - kBorder;
+  if (end <= begin || last_row <= kBorder) return;
+  const float scale = pyramid.scale(l);
+  const auto masked = [&](int x, int y) {
+    if (mask.data == nullptr) return false;
+    const auto to_base = [scale](int p, int size) {
+      return std::clamp(static_cast<int>(std::lround((static_cast<float>(p) + 0.5F) * scale - 0.5F)), 0,
+                        size - 1);
+    };
+    return mask.data[to_base(y, mask.height_px) * mask.stride_bytes + to_base(x, mask.width_px)] == 0;
+  };
+  std::fill(scores.begin(), scores.end(), std::uint8_t{0});
+  bool any[3] = {};
+  // Row y is scored, then row y - 1 has both neighbours. Rows outside count as 0.
+  for (int y = kBorder; y <= last_row; ++y) {
+    any[y % 3] = false;
+    if (y < last_row) {
+      any[y % 3] =
+          kernels->fast_score_row(image.data + static_cast<std::ptrdiff_t>(y) * image.stride_bytes,
+                                  image.stride_bytes, begin, end, options.fast_threshold_min, score_row(y));
+    } else {
+      std::fill_n(score_row(y), row_stride, std::uint8_t{0});
+    }
+    if (!any[(y - 1) % 3]) continue;
+    const std::uint8_t* here = score_row(y - 1);
+    const int count = kernels->maxima_row(score_row(y - 2), here, score_row(y), begin, end, maxima.data());
+    for (int i = 0; i < count; ++i) {
+      const int x = maxima[static_cast<std::size_t>(i)];
+      if (masked(x, y - 1)) continue;
+      level.corners.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y - 1), here[x]});
+    }
+  }
+}
+
+// Corners under the upper threshold stay only in cells that have none above it.
+void Extractor::Workspace::drop_weak(LevelCorners* level) {
+  std::fill(cell_best.begin(), cell_best.end(), std::uint8_t{0});
+  for (const Corner& c : level->corners) {
+    std::uint8_t& best = cell_best[cell_of(*level, c)];
+    best = std::max(best, c.score);
+  }
+  std::erase_if(level->corners, [&](const Corner& c) {
+    return c.score < options.fast_threshold && cell_best[cell_of(*level, c)] >= options.fast_threshold;
+  });
+}
+
+void Extractor::Workspace::choose(const Pyramid& pyramid) {
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    drop_weak(&levels[l]);
+    available[l] = static_cast<int>(levels[l].corners.size());
+  }
+  share_quota(options.features, weights, available, quota);
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    LevelCorners& level = levels[l];
+    const ImageView image = pyramid.level(static_cast<int>(l));
+    const PixelBox box{kBorder, kBorder, image.width_px - kBorder, image.height_px - kBorder};
+    level.corners.resize(static_cast<std::size_t>(select_spread(level.corners, box, quota[l])));
+    std::sort(level.corners.begin(), level.corners.end(), [&](const Corner& a, const Corner& b) {
+      const std::size_t cell_a = cell_of(level, a), cell_b = cell_of(level, b);
+      if (cell_a != cell_b) return cell_a < cell_b;
+      return a.y != b.y ? a.y < b.y : a.x < b.x;
+    });
+  }
+}
+
+// Blurs all of a level but its outermost kBlurBorder pixels into `blurred`.
+void Extractor::Workspace::blur(const ImageView& image) {
+  const int width = image.width_px - 2 * kBlurBorder;
+  const auto ring_row = [this](int y) { return ring.data() + static_cast<std::size_t>(y % 7) * row_stride; };
+  const int first = kBlurBorder, last = image.height_px - kBlurBorder;
+  for (int y = first - 3; y < last + 3; ++y) {
+    kernels->blur_row(image.data + static_cast<std::ptrdiff_t>(y) * image.stride_bytes + kBlurBorder, width,
+                      ring_row(y));
+    const int centre = y - 3;
+    if (centre < first) continue;
+    const std::int16_t* rows[7];
+    for (int k = 0; k < 7; ++k) rows[k] = ring_row(centre - 3 + k);
+    kernels->blur_column(rows, width, blurred_row(centre) + kBlurBorder);
+  }
+}
+
+void Extractor::Workspace::describe(const Pyramid& pyramid, int l, FeatureSet* out) {
+  const LevelCorners& level = levels[static_cast<std::size_t>(l)];
+  if (level.corners.empty()) return;
+  const ImageView image = pyramid.level(l);
+  const float scale = pyramid.scale(l);
+  blur(image);
+  alignas(64) std::uint8_t patch[kPatchSidePx * kPatchStrideBytes];
+  for (const Corner& c : level.corners) {
+    const CentroidMoments m = kernels->centroid(
+        image.data + static_cast<std::ptrdiff_t>(c.y) * image.stride_bytes + c.x, image.stride_bytes);
+    Feature f;
+    f.u_px = (static_cast<float>(c.x) + 0.5F) * scale - 0.5F;
+    f.v_px = (static_cast<float>(c.y) + 0.5F) * scale - 0.5F;
+    f.angle_rad = std::atan2(static_cast<float>(m.m01), static_cast<float>(m.m10));
+    f.score = static_cast<float>(c.score);
+    f.level = static_cast<std::uint8_t>(l);
+    out->features.push_back(f);
+
+    for (int y = 0; y < kPatchSidePx; ++y) {
+      std::memcpy(patch + y * kPatchStrideBytes, blurred_row(c.y - kPatchRadiusPx + y) + c.x - kPatchRadiusPx,
+                  kPatchStrideBytes);
+    }
+    kernels->compare_pairs(patch, steered_pattern().offsets(f.angle_rad),
+                           out->descriptors.emplace_back().words.data());
+  }
+}
+
+Extractor::Extractor(int width_px, int height_px, const PyramidOptions& pyramid,
+                     const ExtractorOptions& options)
+    : workspace_(std::make_unique<Workspace>(width_px, height_px, pyramid, options)) {
+  (void)steered_pattern();  // built now, not in the first frame
+}
+
+Extractor::~Extractor() = default;
+
+void Extractor::extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out) {
+  Workspace& w = *workspace_;
+  w.kernels = &active_kernels();
+  out->features.clear();
+  out->descriptors.clear();
+  out->features.reserve(static_cast<std::size_t>(w.options.features));
+  out->descriptors.reserve(static_cast<std::size_t>(w.options.features));
+  for (int l = 0; l < pyramid.levels(); ++l) w.detect(pyramid, l, mask);
+  w.choose(pyramid);
+  for (int l = 0; l < pyramid.levels(); ++l) w.describe(pyramid, l, out);
+}
+
+}  // namespace farpoint::slam

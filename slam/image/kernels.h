@@ -1,0 +1,86 @@
+// The inner loops of image processing, as a table of functions: a plain C++ version, which is the definition
+// and the reference of the tests, and Highway versions for every instruction set, chosen at run time. All
+// arithmetic is integer, and every version gives the same bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace farpoint::slam {
+
+// One output pixel of a resampled row is the sum of three neighbouring source pixels. Blocks of kBlock
+// outputs read one window of 16 source bytes, so that SIMD needs one load and three shuffles a block.
+struct ResampleBlock {
+  static constexpr int kBlock = 8;
+  static constexpr int kWindow = 16;
+  std::int16_t weight[3][kBlock] = {};  // Q7, the three sum to 128
+  // Shuffle that widens the tap's bytes to 16 bits: byte 2 i is the position within the window, byte 2 i + 1
+  // is 0x80.
+  std::uint8_t shuffle[3][2 * kBlock] = {};
+  std::int32_t first = 0;  // first source byte of the window
+};
+
+// Kernels that fill rows work in whole vectors of at most so many elements: every row handed to one has room
+// for its width rounded up to a multiple of this, and resample_row may read as many bytes behind the last
+// source pixel.
+inline constexpr int kRowAlignment = 64;
+
+// A descriptor and an orientation read a square of this side around the corner, corner at (kRadius, kRadius).
+inline constexpr int kPatchRadiusPx = 15;
+inline constexpr int kPatchSidePx = 2 * kPatchRadiusPx + 1;
+// Side of the compact copy that descriptor offsets refer to: offset = (y + 15) * 32 + (x + 15).
+inline constexpr int kPatchStrideBytes = 32;
+// Half-width of the disc of the intensity centroid at row distance 0..15: floor(sqrt(15.5^2 - y^2)), at
+// most 15.
+inline constexpr int kDiscHalfWidthPx[kPatchRadiusPx + 1] = {15, 15, 15, 15, 14, 14, 14, 13,
+                                                             13, 12, 11, 10, 9,  8,  6,  3};
+
+struct CentroidMoments {
+  std::int32_t m10 = 0;  // sum of x * intensity over the disc
+  std::int32_t m01 = 0;  // sum of y * intensity
+};
+
+struct Kernels {
+  const char* name;
+
+  // Row resampling: out[x] = sum of three taps, Q7 (0..32640). `blocks` cover `width` rounded up to whole
+  // blocks.
+  void (*resample_row)(const std::uint8_t* source, const ResampleBlock* blocks, int width, std::int16_t* out);
+  // Column resampling: out[x] = round(sum of rows * weights), weights Q15 summing to 32768, rows Q7.
+  void (*combine_rows)(const std::int16_t* const rows[3], const std::int16_t weights[3], int width,
+                       std::uint8_t* out);
+
+  // Gaussian blur, sigma 2, seven taps. blur_row gives Q6 and needs three pixels on both sides of
+  // source[0..width) rounded up to kRowAlignment (what they hold at the edges is the caller's business).
+  // blur_column combines seven such rows.
+  void (*blur_row)(const std::uint8_t* source, int width, std::int16_t* out);
+  void (*blur_column)(const std::int16_t* const rows[7], int width, std::uint8_t* out);
+
+  // FAST-9/16: score[x] = the largest threshold t at which nine contiguous of the sixteen pixels on the
+  // circle of radius 3 are all brighter than centre + t or all darker than centre - t; 0 where that is below
+  // `threshold` (>= 1). x in [begin, end); three pixels around must exist. Returns false if all scores are 0.
+  bool (*fast_score_row)(const std::uint8_t* centre_row, std::ptrdiff_t stride, int begin, int end,
+                         int threshold, std::uint8_t* score);
+  // Positions of [begin, end) whose score is positive and a maximum of its 3x3 neighbourhood; of equal
+  // neighbours the last in raster order wins. Columns begin-1 and end are read. Returns how many were written
+  // to `out`.
+  int (*maxima_row)(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int begin,
+                    int end, std::uint16_t* out);
+
+  // First moments of the disc of radius 15 around `centre`. Sixteen pixels to each side are read.
+  CentroidMoments (*centroid)(const std::uint8_t* centre, std::ptrdiff_t stride);
+  // Bit i of the result: patch[offsets[2 i]] < patch[offsets[2 i + 1]], for i < 256.
+  void (*compare_pairs)(const std::uint8_t* patch, const std::uint16_t* offsets, std::uint64_t bits[4]);
+};
+
+[[nodiscard]] const Kernels& plain_kernels();
+// The best of this machine, or what Highway's SetSupportedTargetsForTest left of it.
+[[nodiscard]] const Kernels& simd_kernels();
+// What Pyramid and Extractor use: simd_kernels() unless pinned.
+[[nodiscard]] const Kernels& active_kernels();
+// Pins active_kernels() to "plain", "auto", or a Highway target name ("SSE4", "AVX2", "NEON", ...; see
+// hwy::TargetName) for the rest of the process. False, and nothing changes, if this machine has no such
+// target.
+bool pin_kernels(const char* name);
+
+}  // namespace farpoint::slam

@@ -1,0 +1,270 @@
+// Every SIMD version of every kernel gives the bits of the plain version, and the plain version is what it
+// says.
+#include "slam/image/kernels.h"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <array>
+
+#include "slam/image/descriptor_pattern.h"
+#include "tests/image/test_images.h"
+
+namespace farpoint::slam {
+namespace {
+
+using testing::OwnedImage;
+
+// Textures of every kind: noise (all branches), rectangles (true corners), flat with few grey levels (ties).
+std::vector<OwnedImage> images() {
+  std::vector<OwnedImage> all = {testing::random_image(331, 64, 1), testing::rectangles(331, 64, 90, 2),
+                                 testing::random_image(331, 64, 3)};
+  for (std::uint8_t& p : all[2].pixels) p = static_cast<std::uint8_t>(p >= 128 ? 255 : (p >= 64 ? 10 : 0));
+  return all;
+}
+
+// Runs `check` once with the kernels of every instruction set this machine has.
+template <typename Check>
+void for_each_target(const Check& check) {
+  int tested = 0;
+  for (std::int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
+    const std::int64_t target = targets & -targets;
+    hwy::SetSupportedTargetsForTest(target);
+    const Kernels& kernels = simd_kernels();
+    hwy::SetSupportedTargetsForTest(0);
+    SCOPED_TRACE(kernels.name);
+    check(kernels);
+    ++tested;
+  }
+  EXPECT_GE(tested, 1);
+}
+
+TEST(Kernels, PinningChoosesAndRefuses) {
+  EXPECT_FALSE(pin_kernels("no such target"));
+  EXPECT_STREQ(active_kernels().name, simd_kernels().name);
+  ASSERT_TRUE(pin_kernels("plain"));
+  EXPECT_STREQ(active_kernels().name, "plain");
+  for_each_target([](const Kernels& kernels) {
+    ASSERT_TRUE(pin_kernels(kernels.name));
+    EXPECT_STREQ(active_kernels().name, kernels.name);
+  });
+  ASSERT_TRUE(pin_kernels("auto"));
+  EXPECT_STREQ(active_kernels().name, simd_kernels().name);
+}
+
+TEST(Kernels, RowFiltersAreBitIdentical) {
+  std::mt19937_64 rng(7);
+  for (const OwnedImage& image : images()) {
+    const std::uint8_t* row = image.pixels.data() + 5 * image.width;
+    std::vector<ResampleBlock> blocks;
+    for (int b = 0; b < 20; ++b) {
+      ResampleBlock& block = blocks.emplace_back();
+      block.first = static_cast<std::int32_t>(rng() % 200);
+      for (int i = 0; i < ResampleBlock::kBlock; ++i) {
+        const int w0 = static_cast<int>(rng() % 64), w1 = static_cast<int>(rng() % 64);
+        const int weights[3] = {w0, w1, 128 - w0 - w1};
+        for (int k = 0; k < 3; ++k) {
+          block.shuffle[k][2 * i] = static_cast<std::uint8_t>(rng() % ResampleBlock::kWindow);
+          block.shuffle[k][2 * i + 1] = 0x80;
+          block.weight[k][i] = static_cast<std::int16_t>(weights[k]);
+        }
+      }
+    }
+    std::vector<std::int16_t> expected(512), actual(512);
+    for (const int width : {1, 8, 31, 157}) {
+      plain_kernels().resample_row(row, blocks.data(), width, expected.data());
+      for_each_target([&](const Kernels& kernels) {
+        kernels.resample_row(row, blocks.data(), width, actual.data());
+        EXPECT_TRUE(std::equal(expected.begin(), expected.begin() + width, actual.begin())) << width;
+      });
+      plain_kernels().blur_row(row, width, expected.data());
+      for_each_target([&](const Kernels& kernels) {
+        kernels.blur_row(row, width, actual.data());
+        EXPECT_TRUE(std::equal(expected.begin(), expected.begin() + width, actual.begin())) << width;
+      });
+    }
+  }
+}
+
+TEST(Kernels, ColumnFiltersAreBitIdentical) {
+  std::mt19937_64 rng(11);
+  std::vector<std::vector<std::int16_t>> q7(3, std::vector<std::int16_t>(320)),
+      q6(7, std::vector<std::int16_t>(320));
+  for (auto& row : q7) {
+    for (auto& v : row) v = static_cast<std::int16_t>(rng() % 32641);
+  }
+  for (auto& row : q6) {
+    for (auto& v : row) v = static_cast<std::int16_t>(rng() % 16321);
+  }
+  for (int i = 0; i < 50; ++i) {  // the extremes, in columns
+    for (auto& row : q7) row[static_cast<std::size_t>(i)] = i % 2 == 0 ? 32640 : 0;
+    for (auto& row : q6) row[static_cast<std::size_t>(i)] = i % 2 == 0 ? 16320 : 0;
+  }
+  const std::int16_t* const rows3[3] = {q7[0].data(), q7[1].data(), q7[2].data()};
+  const std::int16_t* rows7[7];
+  for (std::size_t k = 0; k < 7; ++k) rows7[k] = q6[k].data();
+  std::vector<std::uint8_t> expected(320), actual(320);
+  for (const int width : {1, 16, 77, 300}) {
+    for (const auto& w :
+         {std::array<std::int16_t, 3>{4096, 24576, 4096}, std::array<std::int16_t, 3>{0, 16384, 16384},
+          std::array<std::int16_t, 3>{9321, 21001, 2446}}) {
+      plain_kernels().combine_rows(rows3, w.data(), width, expected.data());
+      EXPECT_EQ(expected[0], 255);
+      for_each_target([&](const Kernels& kernels) {
+        kernels.combine_rows(rows3, w.data(), width, actual.data());
+        EXPECT_TRUE(std::equal(expected.begin(), expected.begin() + width, actual.begin())) << width;
+      });
+    }
+    plain_kernels().blur_column(rows7, width, expected.data());
+    EXPECT_EQ(expected[0], 255);
+    for_each_target([&](const Kernels& kernels) {
+      kernels.blur_column(rows7, width, actual.data());
+      EXPECT_TRUE(std::equal(expected.begin(), expected.begin() + width, actual.begin())) << width;
+    });
+  }
+}
+
+TEST(Kernels, FastAndMaximaAreBitIdentical) {
+  for (const OwnedImage& image : images()) {
+    for (const int threshold : {1, 7, 20, 120, 254}) {
+      for (const int end : {4, 12, 40, 100, 328}) {
+        const int begin = 3;
+        std::vector<std::vector<std::uint8_t>> expected(3, std::vector<std::uint8_t>(400, 0)),
+            actual = expected;
+        std::array<bool, 3> any{};
+        for (std::size_t r = 0; r < 3; ++r) {
+          const std::uint8_t* row = image.pixels.data() + (20 + static_cast<int>(r)) * image.width;
+          any[r] =
+              plain_kernels().fast_score_row(row, image.width, begin, end, threshold, expected[r].data());
+        }
+        std::vector<std::uint16_t> maxima(400), maxima_actual(400);
+        const int count = plain_kernels().maxima_row(expected[0].data(), expected[1].data(),
+                                                     expected[2].data(), begin, end, maxima.data());
+        for_each_target([&](const Kernels& kernels) {
+          for (std::size_t r = 0; r < 3; ++r) {
+            const std::uint8_t* row = image.pixels.data() + (20 + static_cast<int>(r)) * image.width;
+            std::fill(actual[r].begin(), actual[r].end(), std::uint8_t{0});
+            EXPECT_EQ(kernels.fast_score_row(row, image.width, begin, end, threshold, actual[r].data()),
+                      any[r]);
+            EXPECT_EQ(expected[r], actual[r]);  // nothing outside [begin, end) is written either
+          }
+          ASSERT_EQ(kernels.maxima_row(expected[0].data(), expected[1].data(), expected[2].data(), begin, end,
+                                       maxima_actual.data()),
+                    count);
+          EXPECT_TRUE(std::equal(maxima.begin(), maxima.begin() + count, maxima_actual.begin()));
+        });
+      }
+    }
+  }
+}
+
+TEST(Kernels, CentroidAndComparisonsAreBitIdentical) {
+  const SteeredPattern pattern;
+  std::vector<OwnedImage> all = images();
+  all.emplace_back(331, 64, 255);
+  for (const OwnedImage& image : all) {
+    for (int x = 20; x < 300; x += 13) {
+      const std::uint8_t* centre = image.pixels.data() + 31 * image.width + x;
+      const CentroidMoments expected = plain_kernels().centroid(centre, image.width);
+      const std::uint16_t* offsets = pattern.offsets(static_cast<float>(x) * 0.02F - 3.1F);
+      std::array<std::uint64_t, 4> bits{};
+      plain_kernels().compare_pairs(image.pixels.data() + x, offsets, bits.data());
+      for_each_target([&](const Kernels& kernels) {
+        const CentroidMoments actual = kernels.centroid(centre, image.width);
+        EXPECT_EQ(actual.m10, expected.m10);
+        EXPECT_EQ(actual.m01, expected.m01);
+        std::array<std::uint64_t, 4> actual_bits{};
+        kernels.compare_pairs(image.pixels.data() + x, offsets, actual_bits.data());
+        EXPECT_EQ(actual_bits, bits);
+      });
+    }
+  }
+}
+
+// FAST as its paper defines it, for one threshold.
+bool is_fast_corner(const OwnedImage& image, int x, int y, int threshold) {
+  constexpr int kX[16] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
+  constexpr int kY[16] = {-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
+  const int centre = image.at(x, y);
+  int bright = 0, dark = 0;
+  for (int i = 0; i < 16 + 8; ++i) {
+    const int v = image.at(x + kX[i % 16], y + kY[i % 16]);
+    bright = v > centre + threshold ? bright + 1 : 0;
+    dark = v < centre - threshold ? dark + 1 : 0;
+    if (bright >= 9 || dark >= 9) return true;
+  }
+  return false;
+}
+
+TEST(Kernels, FastScoreIsTheLargestThresholdThatPasses) {
+  int corners = 0;
+  for (const OwnedImage& image : images()) {
+    for (int y = 10; y < 20; ++y) {
+      std::vector<std::uint8_t> score(400, 0);
+      simd_kernels().fast_score_row(image.pixels.data() + y * image.width, image.width, 3, 328, 5,
+                                    score.data());
+      for (int x = 3; x < 328; ++x) {
+        const int s = score[static_cast<std::size_t>(x)];
+        if (s == 0) {
+          ASSERT_FALSE(is_fast_corner(image, x, y, 5)) << x << " " << y;
+        } else {
+          ASSERT_GE(s, 5);
+          ASSERT_TRUE(is_fast_corner(image, x, y, s)) << x << " " << y;
+          ASSERT_FALSE(is_fast_corner(image, x, y, s + 1)) << x << " " << y;
+          ++corners;
+        }
+      }
+    }
+  }
+  EXPECT_GT(corners, 300);
+}
+
+// Each connected maximum is kept once: no two survivors touch, and whatever was dropped has a neighbour at
+// least as strong.
+TEST(Kernels, MaximaAreNeitherDoubledNorLost) {
+  std::mt19937_64 rng(23);
+  constexpr int kWidth = 120, kHeight = 40;
+  std::vector<std::vector<std::uint8_t>> score(kHeight, std::vector<std::uint8_t>(kWidth, 0));
+  for (int y = 1; y < kHeight - 1; ++y) {
+    for (int x = 1; x < kWidth - 1; ++x) {
+      if (rng() % 3 == 0)
+        score[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] =
+            static_cast<std::uint8_t>(1 + rng() % 4);
+    }
+  }
+  std::vector<std::vector<bool>> kept(kHeight, std::vector<bool>(kWidth, false));
+  std::vector<std::uint16_t> out(kWidth);
+  for (std::size_t y = 1; y + 1 < kHeight; ++y) {
+    const int n = simd_kernels().maxima_row(score[y - 1].data(), score[y].data(), score[y + 1].data(), 1,
+                                            kWidth - 1, out.data());
+    for (int i = 0; i < n; ++i) kept[y][out[static_cast<std::size_t>(i)]] = true;
+  }
+  int survivors = 0;
+  for (std::size_t y = 1; y + 1 < kHeight; ++y) {
+    for (std::size_t x = 1; x + 1 < kWidth; ++x) {
+      if (score[y][x] == 0) {
+        ASSERT_FALSE(kept[y][x]);
+        continue;
+      }
+      bool touches_survivor = false, has_rival = false;
+      for (std::size_t j = y - 1; j <= y + 1; ++j) {
+        for (std::size_t i = x - 1; i <= x + 1; ++i) {
+          if (i == x && j == y) continue;
+          touches_survivor |= kept[j][i];
+          has_rival |= score[j][i] >= score[y][x];
+        }
+      }
+      if (kept[y][x]) {
+        ++survivors;
+        ASSERT_FALSE(touches_survivor);
+      } else {
+        ASSERT_TRUE(has_rival);
+      }
+    }
+  }
+  EXPECT_GT(survivors, 100);
+}
+
+}  // namespace
+}  // namespace farpoint::slam
