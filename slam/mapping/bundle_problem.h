@@ -1,11 +1,13 @@
-// Bundle adjustment over body poses and host-anchored inverse depths, as plain arrays: what the solvers share.
+// Bundle adjustment over body poses and host-anchored inverse depths, as plain arrays: what the solvers
+// share.
 //
 // Residual of one measurement, in units of its sigma:
 //     r = (project_c(T_camera_body T_body_world T_world_host T_host_anchor (f, rho)) - z) / sigma,     2x1
-// with homogeneous points (f, rho), so that a landmark at infinity (rho = 0) is as well conditioned as a near one.
-// Cost: sum of Huber losses of |r|, delta = kHuberDelta.
+// with homogeneous points (f, rho), so that a landmark at infinity (rho = 0) is as well conditioned as a near
+// one. Cost: sum of Huber losses of |r|, delta = kHuberDelta.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "slam/config.h"
@@ -23,21 +25,21 @@ struct BundleProblem {
     int camera = 0;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
     double sigma_px = 1.0;
-    double chi2 = 0;    // out: squared residual in sigmas after the solve; infinite where it does not project
+    double chi2 = 0;  // out: squared residual in sigmas after the solve; infinite where it does not project
   };
   struct Point {
-    int host = 0;       // pose index
+    int host = 0;  // pose index
     SE3 T_host_anchor;
     Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();
     double inverse_depth = 0;
-    double inverse_depth_sigma = 0;    // out: given the poses
+    double inverse_depth_sigma = 0;  // out: given the poses
     int first_measurement = 0, measurements = 0;
   };
 
   const Rig* rig = nullptr;
   std::vector<Pose> poses;
   std::vector<Point> points;
-  std::vector<Measurement> measurements;    // grouped by point
+  std::vector<Measurement> measurements;  // grouped by point
 
   void clear() {
     poses.clear();
@@ -48,7 +50,7 @@ struct BundleProblem {
 
 struct BundleOptions {
   int iterations = 8;
-  double relative_decrease = 1e-4;    // stop when an accepted step gains less than this share of the cost
+  double relative_decrease = 1e-4;  // stop when an accepted step gains less than this share of the cost
 };
 
 struct BundleSummary {
@@ -59,12 +61,12 @@ struct BundleSummary {
 
 // 95 % quantile of chi-square with two degrees of freedom: beyond it a measurement counts as an outlier.
 inline constexpr double kChi2TwoDof = 5.991;
-inline constexpr double kHuberDelta = 2.4477;    // sqrt(kChi2TwoDof)
+inline constexpr double kHuberDelta = 2.4477;  // sqrt(kChi2TwoDof)
 
 // One measurement's residual and derivatives at the present state. False where it does not project.
 struct BundleLinearisation {
   Eigen::Vector2d residual;
-  Eigen::Matrix<double, 2, 6> d_host, d_target;    // by (dt, dphi) of se3.h
+  Eigen::Matrix<double, 2, 6> d_host, d_target;  // by (dt, dphi) of se3.h
   Eigen::Vector2d d_inverse_depth;
 };
 [[nodiscard]] bool linearise(const BundleProblem& problem, const BundleProblem::Point& point,
@@ -72,8 +74,61 @@ struct BundleLinearisation {
 [[nodiscard]] bool residual(const BundleProblem& problem, const BundleProblem::Point& point,
                             const BundleProblem::Measurement& measurement, Eigen::Vector2d* out);
 
-// Levenberg-Marquardt with the inverse depths eliminated first (Schur complement): one thread, no time limit, the same
-// bytes every time.
+// A measurement that stopped projecting (behind the camera) costs a constant, as one of 100 sigmas does, and
+// pulls on nothing: beyond anything a sane start holds, so that no step gains by throwing measurements behind
+// a camera.
+inline constexpr double kLostCost = kHuberDelta * (100.0 - 0.5 * kHuberDelta);
+
+// What all measurements of one state share, made once a state instead of once a measurement. Rotations as
+// matrices; world axes throughout.
+class BundleFrames {
+ public:
+  struct Body {
+    Eigen::Matrix3d R_world_body;
+    Eigen::Vector3d t_world_body;
+  };
+  struct View {  // one camera at one pose
+    Eigen::Matrix3d R_camera_world;
+    Eigen::Vector3d t_camera_world;
+    const Camera* camera = nullptr;
+  };
+  // A landmark as a homogeneous world point (xyz, rho) and how xyz moves with rho.
+  struct WorldPoint {
+    Eigen::Vector3d xyz, d_xyz_d_inverse_depth;
+    double inverse_depth = 0;
+  };
+
+  // Of every pose of the problem; keeps its memory from call to call.
+  void update(const BundleProblem& problem);
+
+  [[nodiscard]] const Body& body(int pose) const { return bodies_[static_cast<std::size_t>(pose)]; }
+  [[nodiscard]] const View& view(const BundleProblem::Measurement& m) const {
+    return views_[static_cast<std::size_t>(m.pose) * cameras_ + static_cast<std::size_t>(m.camera)];
+  }
+  [[nodiscard]] WorldPoint world_point(const BundleProblem::Point& point) const;
+
+ private:
+  std::size_t cameras_ = 0;
+  std::vector<Body> bodies_;
+  std::vector<View> views_;  // pose-major
+};
+
+// One measurement's residual and derivatives by the world point, all in sigmas. False where it does not
+// project.
+struct WorldLinearisation {
+  Eigen::Vector2d residual;
+  Matrix23d d_xyz;
+  Eigen::Vector2d d_inverse_depth;  // in all, the part through xyz included
+};
+[[nodiscard]] bool linearise(const BundleFrames& frames, const BundleProblem::Point& point,
+                             const BundleProblem::Measurement& measurement, BundleLinearisation* out);
+[[nodiscard]] bool linearise_world(const BundleFrames::WorldPoint& point, const BundleFrames::View& view,
+                                   const BundleProblem::Measurement& measurement, WorldLinearisation* out);
+[[nodiscard]] bool residual_world(const BundleFrames::WorldPoint& point, const BundleFrames::View& view,
+                                  const BundleProblem::Measurement& measurement, Eigen::Vector2d* out);
+
+// Levenberg-Marquardt with the inverse depths eliminated first (Schur complement): one thread, no time limit,
+// the same bytes every time.
 BundleSummary solve_schur(const BundleOptions& options, BundleProblem* problem);
 // The same cost by Ceres; the reference the tests hold solve_schur to.
 BundleSummary solve_ceres(const BundleOptions& options, BundleProblem* problem);

@@ -1,7 +1,8 @@
 // Levenberg-Marquardt on the Schur complement of one-dimensional landmarks.
 //
-// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1) / 2
-// rank-one 6x6 updates; general solvers do not specialise to that (see tests/bench for the comparison with Ceres).
+// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1)
+// / 2 rank-one 6x6 updates; general solvers do not specialise to that (see tests/bench for the comparison
+// with Ceres).
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -20,8 +21,6 @@ double huber_weight(double squared) {
   const double r = std::sqrt(squared);
   return r <= kHuberDelta ? 1.0 : kHuberDelta / r;
 }
-// A measurement that stopped projecting (behind the camera) costs a constant and pulls on nothing.
-constexpr double kLostCost = 20.0 * kHuberDelta;
 
 // A landmark's part of the normal equations.
 struct PointBlock {
@@ -30,7 +29,7 @@ struct PointBlock {
 };
 // d2(cost) / d(pose) d(inverse depth) for one free pose.
 struct Coupling {
-  int pose = 0;    // index among the free poses
+  int pose = 0;  // index among the free poses
   Vector6d w = Vector6d::Zero();
 };
 
@@ -190,7 +189,8 @@ class SchurSolver {
     for (const auto& point : p_.points) saved_depths_.push_back(point.inverse_depth);
   }
   void restore() {
-    for (std::size_t i = 0; i < free_poses_.size(); ++i) p_.poses[free_poses_[i]].T_world_body = saved_poses_[i];
+    for (std::size_t i = 0; i < free_poses_.size(); ++i)
+      p_.poses[free_poses_[i]].T_world_body = saved_poses_[i];
     for (std::size_t k = 0; k < p_.points.size(); ++k) p_.points[k].inverse_depth = saved_depths_[k];
   }
   void apply() {
