@@ -1,0 +1,180 @@
+#include "drivers/log_source.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <span>
+
+#include "ipc/channels.h"
+
+namespace farpoint::drivers {
+namespace {
+
+// No vehicle's sensor measures more; a damaged message does.
+constexpr double kMaxAngularVelocity_rad_s = 200.0;
+constexpr double kMaxAcceleration_m_s2 = 2000.0;
+constexpr double kUnitTolerance = 0.01;
+
+bool all_below(std::span<const double> values, double limit) {
+  return std::all_of(values.begin(), values.end(),
+                     [limit](double v) { return std::abs(v) <= limit; });  // NaN: false
+}
+
+bool all_finite(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+bool is_unit_quaternion(std::span<const double> q) {
+  double squared = 0;
+  for (const double v : q) squared += v * v;
+  return std::abs(std::sqrt(squared) - 1.0) <= kUnitTolerance;  // NaN: false
+}
+
+// The N of CAMERA_N; negative for other channels.
+int camera_of(std::string_view channel) {
+  const std::string_view prefix = ipc::kCameraChannelPrefix;
+  if (!channel.starts_with(prefix)) return -1;
+  const std::string_view digits = channel.substr(prefix.size());
+  int camera = -1;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), camera);
+  return error == std::errc{} && end == digits.data() + digits.size() ? camera : -1;
+}
+
+}  // namespace
+
+bool LogSource::next(LogItem* item) {
+  ipc::LogEvent event;
+  while (reader_.next(&event)) {
+    *item = {};
+    item->offset = event.offset;
+    if (take(event, item)) return true;
+  }
+  return false;
+}
+
+bool LogSource::take(const ipc::LogEvent& event, LogItem* item) {
+  if (const int camera = camera_of(event.channel); camera >= 0) return take_image(camera, event, item);
+  if (event.channel == ipc::kImuChannel) return take_imu(event, item);
+  if (event.channel == ipc::kWheelsChannel) return take_wheels(event, item);
+  if (event.channel == ipc::kCalibrationChannel) return take_calibration(event, item);
+  if (event.channel == ipc::kGroundTruthChannel) return take_ground_truth(event, item);
+  ++counts_.others;
+  return false;
+}
+
+template <typename Message>
+bool LogSource::decode_message(const ipc::LogEvent& event, Message* message) {
+  if (ipc::decode(event.data, message)) return true;
+  ++counts_.messages_undecodable;
+  return false;
+}
+
+// True where the stream may go on with this time.
+bool LogSource::accept_time(std::int64_t utime, bool check_leap, Stream* stream) {
+  const bool is_later = stream->last == Stream::kNone || utime > stream->last;
+  const bool leaps = check_leap && stream->last != Stream::kNone && is_later &&
+                     static_cast<std::uint64_t>(utime) - static_cast<std::uint64_t>(stream->last) >
+                         static_cast<std::uint64_t>(kMaxLeap_us);
+  const bool borne_out = stream->doubtful != Stream::kNone && utime > stream->doubtful;
+  if (!is_later || (leaps && !borne_out)) {
+    stream->doubtful = leaps ? utime : Stream::kNone;
+    ++counts_.times_backwards;
+    return false;
+  }
+  stream->last = utime;
+  stream->doubtful = Stream::kNone;
+  return true;
+}
+
+bool LogSource::take_image(int camera, const ipc::LogEvent& event, LogItem* item) {
+  if (!decode_message(event, &image_)) return false;
+  const bool calibrated = !has_calibration_ || camera < calibration_.ncameras;
+  if (camera >= kMaxCameras || camera != image_.camera || !calibrated) {
+    ++counts_.images_unknown_camera;
+    return false;
+  }
+  if (has_calibration_) {
+    const camera_calibration_t& expected = calibration_.cameras[static_cast<std::size_t>(camera)];
+    if (image_.width != expected.width || image_.height != expected.height) {
+      ++counts_.images_wrong_size;
+      return false;
+    }
+  }
+  if (!accept_time(image_.utime, true, &camera_streams_[static_cast<std::size_t>(camera)])) return false;
+  ++counts_.images;
+  item->kind = LogItemKind::kImage;
+  item->utime = image_.utime;
+  item->camera = camera;
+  item->image = &image_;
+  return true;
+}
+
+bool LogSource::take_imu(const ipc::LogEvent& event, LogItem* item) {
+  if (!decode_message(event, &imu_)) return false;
+  if (!all_below(imu_.angular_velocity, kMaxAngularVelocity_rad_s) ||
+      !all_below(imu_.acceleration, kMaxAcceleration_m_s2)) {
+    ++counts_.imu_invalid;
+    return false;
+  }
+  if (!accept_time(imu_.utime, true, &imu_stream_)) return false;
+  ++counts_.imu;
+  item->kind = LogItemKind::kImu;
+  item->utime = imu_.utime;
+  item->imu = &imu_;
+  return true;
+}
+
+bool LogSource::take_wheels(const ipc::LogEvent& event, LogItem* item) {
+  if (!decode_message(event, &wheels_)) return false;
+  const auto wheels = std::span(wheels_.wheel_speed).first(static_cast<std::size_t>(wheels_.nwheels));
+  const bool infinite = std::isinf(wheels_.speed) || std::isinf(wheels_.yaw_rate) ||
+                        std::isinf(wheels_.steering_angle) || !std::isfinite(wheels_.speed_sigma) ||
+                        std::any_of(wheels.begin(), wheels.end(), [](double v) { return std::isinf(v); });
+  if (infinite) {
+    ++counts_.wheels_invalid;
+    return false;
+  }
+  if (!accept_time(wheels_.utime, false, &wheels_stream_)) return false;
+  ++counts_.wheels;
+  item->kind = LogItemKind::kWheels;
+  item->utime = wheels_.utime;
+  item->wheels = &wheels_;
+  return true;
+}
+
+bool LogSource::take_calibration(const ipc::LogEvent& event, LogItem* item) {
+  calibration_t calibration{};  // a damaged one must not spoil the one that holds
+  if (!decode_message(event, &calibration)) return false;
+  calibration_ = std::move(calibration);
+  has_calibration_ = true;
+  ++counts_.calibrations;
+  item->kind = LogItemKind::kCalibration;
+  item->utime = calibration_.utime;
+  item->calibration = &calibration_;
+  return true;
+}
+
+bool LogSource::take_ground_truth(const ipc::LogEvent& event, LogItem* item) {
+  if (!decode_message(event, &ground_truth_)) return false;
+  const bool has_rotation = !ground_truth_.has_orientation || is_unit_quaternion(ground_truth_.orientation);
+  if (!all_finite(ground_truth_.position) || !has_rotation) {
+    ++counts_.ground_truths_invalid;
+    return false;
+  }
+  if (!accept_time(ground_truth_.utime, false, &ground_truth_stream_)) return false;
+  ++counts_.ground_truths;
+  item->kind = LogItemKind::kGroundTruth;
+  item->utime = ground_truth_.utime;
+  item->ground_truth = &ground_truth_;
+  return true;
+}
+
+ipc::ImageStatus LogSource::decode(const LogItem& item, ipc::GreyImage* image) {
+  const ipc::ImageStatus status = decoder_.decode(*item.image, image);
+  if (status == ipc::ImageStatus::kWrongSize) ++counts_.images_wrong_size;
+  if (status == ipc::ImageStatus::kDamaged || status == ipc::ImageStatus::kUnknownFormat)
+    ++counts_.images_undecodable;
+  return status;
+}
+
+}  // namespace farpoint::drivers

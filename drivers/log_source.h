@@ -1,0 +1,105 @@
+// A recorded LCM log as the source of measurements: in the order of the file, checked, with counts of what
+// was refused.
+//
+// A measurement's time is its message's utime; the log event's time is only when it was recorded.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "ipc/image_codec.h"
+#include "ipc/log.h"
+#include "ipc/message.h"
+
+namespace farpoint::drivers {
+
+struct LogSourceCounts {
+  // Given out.
+  std::uint64_t images = 0, imu = 0, wheels = 0, calibrations = 0, ground_truths = 0;
+  // Refused.
+  std::uint64_t messages_undecodable = 0;  // damaged LCM messages on known channels
+  std::uint64_t images_unknown_camera =
+      0;                                // the calibration has no such camera, or channel and message disagree
+  std::uint64_t images_wrong_size = 0;  // not the calibration's, or not what the message itself says
+  std::uint64_t images_undecodable = 0;  // damaged JPEG or PNG, unknown pixel format
+  std::uint64_t times_backwards =
+      0;  // not after the one before it, or a leap that the next one does not bear out
+  std::uint64_t imu_invalid = 0;            // not finite, or beyond any sensor's range
+  std::uint64_t wheels_invalid = 0;         // infinite
+  std::uint64_t ground_truths_invalid = 0;  // not finite, or no rotation
+  // Passed over: other channels.
+  std::uint64_t others = 0;
+};
+
+enum class LogItemKind : std::uint8_t { kImage, kImu, kWheels, kCalibration, kGroundTruth };
+
+// One measurement. The pointer that its kind names is set, the others are null; what it points to is the
+// source's and holds until its next call.
+struct LogItem {
+  LogItemKind kind = LogItemKind::kImage;
+  std::int64_t utime = 0;
+  std::uint64_t offset = 0;        // of the event in the file, bytes
+  int camera = -1;                 // of an image
+  const image_t* image = nullptr;  // still compressed: see decode()
+  const imu_t* imu = nullptr;
+  const wheels_t* wheels = nullptr;
+  const calibration_t* calibration = nullptr;
+  const ground_truth_t* ground_truth = nullptr;
+};
+
+class LogSource {
+ public:
+  static constexpr int kMaxCameras = 8;
+  // A camera or IMU that leaps further ahead than this is believed only with its next message: one damaged
+  // time must not make all that follow look old.
+  static constexpr std::int64_t kMaxLeap_us = 2'000'000;
+
+  // "-" is standard input. Throws std::runtime_error naming the log where it cannot be opened.
+  explicit LogSource(const std::string& path) : reader_(path) {}
+
+  // The next measurement that passes the checks; false at the end. From the first calibration on, images are
+  // held against it.
+  [[nodiscard]] bool next(LogItem* item);
+  // Decodes an image item; counts it where it fails. Precondition: next() has not been called since.
+  [[nodiscard]] ipc::ImageStatus decode(const LogItem& item, ipc::GreyImage* image);
+
+  [[nodiscard]] const LogSourceCounts& counts() const { return counts_; }
+  [[nodiscard]] const ipc::LogDamage& damage() const { return reader_.damage(); }
+  [[nodiscard]] std::uint64_t events() const { return reader_.events(); }
+
+ private:
+  // Times of one stream.
+  struct Stream {
+    static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
+    std::int64_t last = kNone;      // given out last
+    std::int64_t doubtful = kNone;  // leapt ahead, not yet borne out
+  };
+
+  bool accept_time(std::int64_t utime, bool check_leap, Stream* stream);
+  bool take(const ipc::LogEvent& event, LogItem* item);
+  bool take_image(int camera, const ipc::LogEvent& event, LogItem* item);
+  bool take_imu(const ipc::LogEvent& event, LogItem* item);
+  bool take_wheels(const ipc::LogEvent& event, LogItem* item);
+  bool take_calibration(const ipc::LogEvent& event, LogItem* item);
+  bool take_ground_truth(const ipc::LogEvent& event, LogItem* item);
+  template <typename Message>
+  bool decode_message(const ipc::LogEvent& event, Message* message);
+
+  ipc::LogReader reader_;
+  ipc::ImageDecoder decoder_;
+  LogSourceCounts counts_;
+  std::array<Stream, kMaxCameras> camera_streams_;
+  Stream imu_stream_, wheels_stream_, ground_truth_stream_;
+  bool has_calibration_ = false;
+  // Reused from message to message.
+  image_t image_{};
+  imu_t imu_{};
+  wheels_t wheels_{};
+  calibration_t calibration_{};
+  ground_truth_t ground_truth_{};
+};
+
+}  // namespace farpoint::drivers
