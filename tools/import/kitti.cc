@@ -76,7 +76,7 @@ std::vector<RecordingCamera> read_cameras(const fs::path& calibration, bool ster
   const std::map<std::string, Projection> projections = read_projections(calibration);
   std::vector<RecordingCamera> cameras;
   for (int c = 0; c < (stereo ? 2 : 1); ++c) {
-    const std::string label = "P" + std::to_string(c) + ":";
+    const std::string label = c == 0 ? "P0:" : "P1:";
     const auto found = projections.find(label);
     if (found == projections.end()) {
       throw InputError(calibration.string() + ": line '" + label + "' is missing, expected " +
