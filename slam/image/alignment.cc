@@ -4,6 +4,7 @@
 // Both the host patch and the image are read through the same quadratic B-spline smoothing. Linear
 // interpolation blurs by an amount that depends on the sub-pixel position, which pulls the minimum towards
 // whole pixels; this spline shifts nothing and blurs by a variance of 1/4 px^2 at every position.
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
