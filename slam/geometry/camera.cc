@@ -15,23 +15,27 @@ using Distortion = std::array<double, 5>;
 constexpr double kMaxPinholeRadius = 100.0;
 // Straight behind a fisheye every direction in the image plane is as good as any other; stop just before.
 constexpr double kMaxFisheyeTheta_rad = std::numbers::pi - 1e-3;
-// Smallest derivative of the distortion that still counts as monotonic: below it Newton's step, and the noise of
-// a pixel turned into an angle, grow without use.
+// Smallest derivative of the distortion that still counts as monotonic: below it Newton's step, and the noise
+// of a pixel turned into an angle, grow without use.
 constexpr double kMinSlope = 1e-3;
-// A calibration that leaves less of its own image with rays than this is a wrong one (sign or order of coefficients).
+// A calibration that leaves less of its own image with rays than this is a wrong one (sign or order of
+// coefficients).
 constexpr double kMinUsableShare = 0.5;
 
 // --- radial-tangential, on the plane z = 1 ---
 
-double radial_factor(const Distortion& d, double r2) { return 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4])); }
+double radial_factor(const Distortion& d, double r2) {
+  return 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+}
 
 // d(r * radial_factor)/dr.
 double radial_slope(const Distortion& d, double r2) {
   return 1.0 + r2 * (3.0 * d[0] + r2 * (5.0 * d[1] + r2 * 7.0 * d[4]));
 }
 
-// Lower bound of the smallest eigenvalue of the 2x2 derivative of the distortion over the circle of radius r. The
-// radial part has the eigenvalues radial_factor and radial_slope, the tangential part none below -6 |p| r.
+// Lower bound of the smallest eigenvalue of the 2x2 derivative of the distortion over the circle of radius r.
+// The radial part has the eigenvalues radial_factor and radial_slope, the tangential part none below -6 |p|
+// r.
 double radtan_slope_bound(const Distortion& d, double r) {
   const double r2 = r * r;
   return std::min(radial_factor(d, r2), radial_slope(d, r2)) - 6.0 * std::hypot(d[2], d[3]) * r;
@@ -40,11 +44,12 @@ double radtan_slope_bound(const Distortion& d, double r) {
 Eigen::Vector2d radtan_distort(const Distortion& d, const Eigen::Vector2d& m) {
   const double x = m.x(), y = m.y(), r2 = m.squaredNorm(), xy = x * y;
   const double k = radial_factor(d, r2);
-  return {k * x + 2.0 * d[2] * xy + d[3] * (r2 + 2.0 * x * x), k * y + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * xy};
+  return {k * x + 2.0 * d[2] * xy + d[3] * (r2 + 2.0 * x * x),
+          k * y + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * xy};
 }
 
-// d(distorted)/d(undistorted). Symmetric: the distortion is the gradient of a function, so where this is positive
-// definite over a disc, no two points of the disc share an image.
+// d(distorted)/d(undistorted). Symmetric: the distortion is the gradient of a function, so where this is
+// positive definite over a disc, no two points of the disc share an image.
 Eigen::Matrix2d radtan_derivative(const Distortion& d, const Eigen::Vector2d& m) {
   const double x = m.x(), y = m.y(), r2 = m.squaredNorm();
   const double k = radial_factor(d, r2);
@@ -69,7 +74,8 @@ double fisheye_slope(const Distortion& d, double theta) {
   return 1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])));
 }
 
-// Largest x in [0, end] with slope(x') > kMinSlope for all x' <= x. Scans evenly, then bisects the first failure.
+// Largest x in [0, end] with slope(x') > kMinSlope for all x' <= x. Scans evenly, then bisects the first
+// failure.
 template <typename Slope>
 double monotonic_end(const Slope& slope, double end) {
   constexpr int kSteps = 4000;
@@ -107,9 +113,10 @@ double solve_rising(const Value& value, const Slope& slope, double target, doubl
   return x;
 }
 
-// Inverse of radtan_distort within max_radius. Starts from the purely radial solution, which leaves Newton only the
-// small tangential part. False where no point of the disc has this image.
-bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vector2d& distorted, Eigen::Vector2d* m) {
+// Inverse of radtan_distort within max_radius. Starts from the purely radial solution, which leaves Newton
+// only the small tangential part. False where no point of the disc has this image.
+bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vector2d& distorted,
+                      Eigen::Vector2d* m) {
   const double rd = distorted.norm();
   if (!std::isfinite(rd)) return false;
   const double r = solve_rising([&](double x) { return x * radial_factor(d, x * x); },
@@ -161,7 +168,8 @@ Camera::Camera(const Parameters& p) : p_(p) {
                                    std::atan(kMaxPinholeRadius));
     max_radius_ = std::tan(max_theta_rad_);
   } else {
-    max_theta_rad_ = monotonic_end([&](double theta) { return fisheye_slope(d, theta); }, kMaxFisheyeTheta_rad);
+    max_theta_rad_ =
+        monotonic_end([&](double theta) { return fisheye_slope(d, theta); }, kMaxFisheyeTheta_rad);
     max_radius_ = fisheye_theta_d(d, max_theta_rad_);
   }
 }
@@ -169,8 +177,10 @@ Camera::Camera(const Parameters& p) : p_(p) {
 std::string Camera::check(const Parameters& p) {
   if (p.width_px <= 0) return wrong("width", p.width_px, "a number of pixels above 0");
   if (p.height_px <= 0) return wrong("height", p.height_px, "a number of pixels above 0");
-  if (!(std::isfinite(p.fx_px) && p.fx_px > 0.0)) return wrong("fx", p.fx_px, "a finite number of pixels above 0");
-  if (!(std::isfinite(p.fy_px) && p.fy_px > 0.0)) return wrong("fy", p.fy_px, "a finite number of pixels above 0");
+  if (!(std::isfinite(p.fx_px) && p.fx_px > 0.0))
+    return wrong("fx", p.fx_px, "a finite number of pixels above 0");
+  if (!(std::isfinite(p.fy_px) && p.fy_px > 0.0))
+    return wrong("fy", p.fy_px, "a finite number of pixels above 0");
   if (!(p.cx_px >= 0.0 && p.cx_px <= p.width_px - 1)) {
     return wrong("cx", p.cx_px, "0 to " + std::to_string(p.width_px - 1) + " (inside the image)");
   }
@@ -215,7 +225,8 @@ bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel) con
   return true;
 }
 
-bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel, Matrix23d* d_pixel_d_point) const {
+bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel,
+                     Matrix23d* d_pixel_d_point) const {
   if (!project(point_c, pixel)) return false;
   const double x = point_c.x(), y = point_c.y(), z = point_c.z();
   Matrix23d& j = *d_pixel_d_point;
@@ -225,7 +236,8 @@ bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel, Mat
     d_m_d_point << 1.0 / z, 0.0, -m.x() / z, 0.0, 1.0 / z, -m.y() / z;
     j = radtan_derivative(p_.distortion, m) * d_m_d_point;
   } else {
-    // m = k (x, y) with k = theta_d / rho. Its derivative along rho is a, across it k; along z it is -slope / n^2.
+    // m = k (x, y) with k = theta_d / rho. Its derivative along rho is a, across it k; along z it is -slope /
+    // n^2.
     const double rho = std::hypot(x, y), n2 = point_c.squaredNorm();
     const double theta = std::atan2(rho, z);
     const double slope = fisheye_slope(p_.distortion, theta);
@@ -250,8 +262,9 @@ bool Camera::unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c)
   }
   const double rd = std::hypot(md.x(), md.y());
   if (!(rd <= max_radius_)) return false;
-  const double theta = solve_rising([&](double t) { return fisheye_theta_d(p_.distortion, t); },
-                                    [&](double t) { return fisheye_slope(p_.distortion, t); }, rd, max_theta_rad_);
+  const double theta =
+      solve_rising([&](double t) { return fisheye_theta_d(p_.distortion, t); },
+                   [&](double t) { return fisheye_slope(p_.distortion, t); }, rd, max_theta_rad_);
   const double s = rd > 0.0 ? std::sin(theta) / rd : 0.0;
   *bearing_c = Eigen::Vector3d(s * md.x(), s * md.y(), std::cos(theta)).normalized();
   return true;

@@ -11,8 +11,8 @@ namespace farpoint::slam {
 
 namespace {
 
-// Polynomials in x, y, z of degree 1, 2 and 3 as coefficient rows. The order of the cubic monomials is Nister's: the
-// first ten are eliminated, what stays is linear in x and y.
+// Polynomials in x, y, z of degree 1, 2 and 3 as coefficient rows. The order of the cubic monomials is
+// Nister's: the first ten are eliminated, what stays is linear in x and y.
 struct Monomial {
   int x, y, z;
 };
@@ -59,7 +59,8 @@ using Cubic = std::array<double, 20>;
 
 void add_product(const Linear& a, const Linear& b, double factor, Quadratic* sum) {
   for (size_t i = 0; i < 4; ++i) {
-    for (size_t k = 0; k < 4; ++k) (*sum)[static_cast<size_t>(kLinearTimesLinear[i][k])] += factor * a[i] * b[k];
+    for (size_t k = 0; k < 4; ++k)
+      (*sum)[static_cast<size_t>(kLinearTimesLinear[i][k])] += factor * a[i] * b[k];
   }
 }
 
@@ -127,8 +128,8 @@ double evaluate(const ZPolynomial& p, double z) {
 using ZMatrix = std::array<std::array<ZPolynomial, 3>, 3>;
 using Eliminated = Eigen::Matrix<double, 10, 10>;
 
-// B(z) (x y 1)^T = 0. Row r comes from the eliminated rows of (monomial times z) and (monomial), x^2, y^2 and xy in
-// turn: the first minus z times the second cancels the leading terms.
+// B(z) (x y 1)^T = 0. Row r comes from the eliminated rows of (monomial times z) and (monomial), x^2, y^2 and
+// xy in turn: the first minus z times the second cancels the leading terms.
 ZMatrix remaining_matrix(const Eliminated& g) {
   ZMatrix b{};
   for (size_t r = 0; r < 3; ++r) {
@@ -160,7 +161,8 @@ ZPolynomial determinant(const ZMatrix& b) {
   return det;
 }
 
-// Null vector (x y 1) of B(z): the longest of the cross products of its rows. False where it lies at infinity.
+// Null vector (x y 1) of B(z): the longest of the cross products of its rows. False where it lies at
+// infinity.
 bool solve_x_y(const ZMatrix& b, double z, double* x, double* y) {
   Eigen::Matrix3d m;
   for (size_t r = 0; r < 3; ++r) {

@@ -13,9 +13,9 @@ struct EssentialCandidates {
   size_t count = 0;
 };
 
-// Essential matrices E with bearing_2^T E bearing_1 = 0 for five matches of unit bearings (any field of view).
-// Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004: null space, elimination to a
-// 3x3 matrix of polynomials, real roots of its determinant of degree ten. No heap.
+// Essential matrices E with bearing_2^T E bearing_1 = 0 for five matches of unit bearings (any field of
+// view). Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004: null space,
+// elimination to a 3x3 matrix of polynomials, real roots of its determinant of degree ten. No heap.
 [[nodiscard]] EssentialCandidates solve_five_point(std::span<const Eigen::Vector3d, 5> bearings_1,
                                                    std::span<const Eigen::Vector3d, 5> bearings_2);
 

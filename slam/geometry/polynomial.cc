@@ -16,7 +16,8 @@ double evaluate(const Coefficients& c, size_t degree, double x) {
 }
 
 // The root between low and high, where the signs differ: Newton, halving the bracket whenever it leaves it.
-double bracketed_root(const Coefficients& c, const Coefficients& derivative, size_t degree, double low, double high) {
+double bracketed_root(const Coefficients& c, const Coefficients& derivative, size_t degree, double low,
+                      double high) {
   const bool rising = evaluate(c, degree, low) < 0.0;
   double x = 0.5 * (low + high);
   for (int i = 0; i < 80; ++i) {
@@ -48,8 +49,8 @@ RealRoots real_roots(std::span<const double> c, double low, double high) {
       derivative[k][i] = static_cast<double>(i + 1) * derivative[k - 1][i + 1];
     }
   }
-  // Between neighbouring roots of its derivative a polynomial is monotonic and has at most one root: climb from the
-  // linear derivative up to the polynomial itself.
+  // Between neighbouring roots of its derivative a polynomial is monotonic and has at most one root: climb
+  // from the linear derivative up to the polynomial itself.
   for (size_t k = degree; k-- > 0;) {
     RealRoots found;
     double left = low;
@@ -58,7 +59,8 @@ RealRoots real_roots(std::span<const double> c, double low, double high) {
       const double right = i < roots.count ? roots.value[i] : high;
       const double right_value = evaluate(derivative[k], degree - k, right);
       if ((left_value < 0.0) != (right_value < 0.0) && found.count < degree - k) {
-        found.value[found.count++] = bracketed_root(derivative[k], derivative[k + 1], degree - k, left, right);
+        found.value[found.count++] =
+            bracketed_root(derivative[k], derivative[k + 1], degree - k, left, right);
       }
       left = right;
       left_value = right_value;

@@ -1,5 +1,5 @@
-// Small deterministic random generator for sampling matches. The standard library fixes its engines' sequences but not
-// its distributions', so samples drawn with those would differ between compilers.
+// Small deterministic random generator for sampling matches. The standard library fixes its engines'
+// sequences but not its distributions', so samples drawn with those would differ between compilers.
 #pragma once
 
 #include <array>

@@ -15,9 +15,15 @@ namespace farpoint::slam {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Residuals beyond 3 sigma take no part in a refinement; chi-square limits for 1 and 2 degrees of freedom (99.7 %).
-constexpr double kUse1Dof = 9.0;
-constexpr double kUse2Dof = 11.8;
+// Limits in sigma within which matches take part in a motion's refinement, round by round. Wide at first: the
+// matches that agree with a motion from a minimal sample are a biased choice and would hold it where it is.
+constexpr std::array<double, 5> kMotionLimits_sigma = {8.0, 5.0, 3.0, 3.0, 3.0};
+// Neighbours on either side in the order of parallax, and the share of them that must fit as well.
+constexpr size_t kSupportNeighbours = 10;
+constexpr double kMinSupport = 0.5;
+constexpr int kStepsARound = 6;
+// The same as chi-square limits with 2 degrees of freedom for a homography (the last is 99.7 %).
+constexpr std::array<double, 5> kHomographyLimits_chi2 = {64.0, 25.0, 11.8, 11.8, 11.8};
 // Huber's tuning constant: 95 % efficiency for Gaussian noise.
 constexpr double kHuber = 1.345;
 
@@ -45,7 +51,8 @@ Matrix32d tangent_base(const Eigen::Vector3d& unit) {
 }
 
 // Epipolar residual r = c / s of one match. With a = R b1 and n = t x a:
-//   c = b2 . n,  s^2 = |t x a|^2 + |t x b2|^2 - 2 c^2  (the constraint's gradient over the tangents of both bearings).
+//   c = b2 . n,  s^2 = |t x a|^2 + |t x b2|^2 - 2 c^2  (the constraint's gradient over the tangents of both
+//   bearings).
 struct EpipolarTerm {
   double c, s2;
 };
@@ -55,7 +62,8 @@ EpipolarTerm epipolar_term(const Eigen::Vector3d& t, const Eigen::Vector3d& a, c
   return {c, n.squaredNorm() + t.cross(b2).squaredNorm() - 2.0 * c * c};
 }
 
-double motion_cost(Bearings b1, Bearings b2, std::span<const size_t> use, double sigma_rad, const SE3& T_2_1) {
+double motion_cost(Bearings b1, Bearings b2, std::span<const size_t> use, double sigma_rad,
+                   const SE3& T_2_1) {
   const Eigen::Matrix3d r = T_2_1.rotation();
   double cost = 0.0;
   for (const size_t i : use) {
@@ -77,7 +85,8 @@ void motion_normal_equations(Bearings b1, Bearings b2, std::span<const size_t> u
     const Eigen::Vector3d a = r * b1[i];
     const EpipolarTerm e = epipolar_term(t, a, b2[i]);
     if (!(e.s2 > 0.0)) continue;
-    // s^2 = 2 - (t.a)^2 - (t.b2)^2 - 2 c^2 for unit vectors; derivatives along a turn w (a moves by w x a) and along t.
+    // s^2 = 2 - (t.a)^2 - (t.b2)^2 - 2 c^2 for unit vectors; derivatives along a turn w (a moves by w x a)
+    // and along t.
     const double ta = t.dot(a), tb = t.dot(b2[i]);
     const Eigen::Vector3d dc_dt = a.cross(b2[i]);
     const Eigen::Vector3d dc_dw = a.cross(b2[i].cross(t));
@@ -103,14 +112,15 @@ SE3 moved(const SE3& T_2_1, const Matrix32d& base_1, const Vector5d& step) {
   return next;
 }
 
-Matrix32d translation_base_1(const SE3& T_2_1) { return tangent_base((T_2_1.q.conjugate() * T_2_1.t).normalized()); }
+Matrix32d translation_base_1(const SE3& T_2_1) {
+  return tangent_base((T_2_1.q.conjugate() * T_2_1.t).normalized());
+}
 
 // Levenberg-Marquardt on a fixed set of matches.
 SE3 descend(Bearings b1, Bearings b2, std::span<const size_t> use, double sigma_rad, SE3 T_2_1) {
-  constexpr int kMaxSteps = 15;
   double cost = motion_cost(b1, b2, use, sigma_rad, T_2_1);
   double lambda = 1e-4;
-  for (int i = 0; i < kMaxSteps; ++i) {
+  for (int i = 0; i < kStepsARound; ++i) {
     const Matrix32d base = translation_base_1(T_2_1);
     Matrix5d h;
     Vector5d g;
@@ -131,20 +141,21 @@ SE3 descend(Bearings b1, Bearings b2, std::span<const size_t> use, double sigma_
         cost = next_cost;
       }
     }
-    if (!accepted || step.norm() < 1e-9) break;
+    if (!accepted || step.norm() < 1e-4 * sigma_rad) break;
   }
   return T_2_1;
 }
 
-// Residual of a homography: c = B2^T H b1, zero where H b1 is parallel to b2 (B2: tangent plane of b2), with its
-// covariance for unit noise in both tangent planes.
+// Residual of a homography: c = B2^T H b1, zero where H b1 is parallel to b2 (B2: tangent plane of b2), with
+// its covariance for unit noise in both tangent planes.
 struct HomographyTerm {
   Eigen::Vector2d c;
   Eigen::Matrix2d covariance;
   Matrix32d base_2;
   double forward;  // b2 . H b1
 };
-HomographyTerm homography_term(const Eigen::Matrix3d& h, const Eigen::Vector3d& b1, const Eigen::Vector3d& b2) {
+HomographyTerm homography_term(const Eigen::Matrix3d& h, const Eigen::Vector3d& b1,
+                               const Eigen::Vector3d& b2) {
   HomographyTerm term;
   term.base_2 = tangent_base(b2);
   const Eigen::Vector3d transferred = h * b1;
@@ -164,9 +175,41 @@ Matrix29d homography_jacobian(const Matrix32d& base_2, const Eigen::Vector3d& b1
 
 }  // namespace
 
-double epipolar_residual2_rad2(const SE3& T_2_1, const Eigen::Vector3d& bearing_1, const Eigen::Vector3d& bearing_2) {
+double epipolar_residual2_rad2(const SE3& T_2_1, const Eigen::Vector3d& bearing_1,
+                               const Eigen::Vector3d& bearing_2) {
   const EpipolarTerm e = epipolar_term(T_2_1.t, T_2_1.q * bearing_1, bearing_2);
   return e.s2 > 0.0 ? e.c * e.c / e.s2 : kInfinity;
+}
+
+std::vector<uint8_t> supported_matches(Bearings bearings_1, Bearings bearings_2, const SE3& T_2_1,
+                                       double limit_rad) {
+  const size_t n = bearings_1.size();
+  struct Entry {
+    double parallax;
+    size_t match;
+    bool fits;
+  };
+  std::vector<Entry> entries(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double r2 = epipolar_residual2_rad2(T_2_1, bearings_1[i], bearings_2[i]);
+    // The chord grows with the angle, which is all that sorting needs.
+    entries[i] = {(T_2_1.q * bearings_1[i] - bearings_2[i]).squaredNorm(), i, r2 < limit_rad * limit_rad};
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return a.parallax != b.parallax ? a.parallax < b.parallax : a.match < b.match;
+  });
+  std::vector<size_t> fitting_before(n + 1, 0);
+  for (size_t i = 0; i < n; ++i) fitting_before[i + 1] = fitting_before[i] + (entries[i].fits ? 1U : 0U);
+  std::vector<uint8_t> mask(n, 0);
+  for (size_t i = 0; i < n; ++i) {
+    if (!entries[i].fits) continue;
+    const size_t first = i > kSupportNeighbours ? i - kSupportNeighbours : 0;
+    const size_t last = std::min(n, i + kSupportNeighbours + 1);
+    const size_t others = last - first - 1, fitting = fitting_before[last] - fitting_before[first] - 1;
+    mask[entries[i].match] =
+        static_cast<double>(fitting) >= kMinSupport * static_cast<double>(others) ? 1 : 0;
+  }
+  return mask;
 }
 
 std::array<SE3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
@@ -179,19 +222,20 @@ std::array<SE3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
   const Eigen::Quaterniond q_1(Eigen::Matrix3d(u * w * v.transpose()));
   const Eigen::Quaterniond q_2(Eigen::Matrix3d(u * w.transpose() * v.transpose()));
   const Eigen::Vector3d t = u.col(2);
-  return {SE3{q_1.normalized(), t}, SE3{q_1.normalized(), -t}, SE3{q_2.normalized(), t}, SE3{q_2.normalized(), -t}};
+  return {SE3{q_1.normalized(), t}, SE3{q_1.normalized(), -t}, SE3{q_2.normalized(), t},
+          SE3{q_2.normalized(), -t}};
 }
 
-MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad, const SE3& T_2_1, int rounds) {
+MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad, const SE3& T_2_1) {
   MotionFit fit{T_2_1, kInfinity, 0};
   fit.T_2_1.t.normalize();
   std::vector<size_t> use;
-  use.reserve(bearings_1.size());
-  for (int round = 0; round < rounds; ++round) {
+  for (const double limit_sigma : kMotionLimits_sigma) {
+    const std::vector<uint8_t> mask =
+        supported_matches(bearings_1, bearings_2, fit.T_2_1, limit_sigma * sigma_rad);
     use.clear();
-    for (size_t i = 0; i < bearings_1.size(); ++i) {
-      const double r2 = epipolar_residual2_rad2(fit.T_2_1, bearings_1[i], bearings_2[i]);
-      if (r2 < kUse1Dof * sigma_rad * sigma_rad) use.push_back(i);
+    for (size_t i = 0; i < mask.size(); ++i) {
+      if (mask[i] != 0) use.push_back(i);
     }
     if (use.size() < 6) return fit;
     fit.T_2_1 = descend(bearings_1, bearings_2, use, sigma_rad, fit.T_2_1);
@@ -199,7 +243,8 @@ MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_r
   }
   Matrix5d h;
   Vector5d g;
-  motion_normal_equations(bearings_1, bearings_2, use, sigma_rad, fit.T_2_1, translation_base_1(fit.T_2_1), &h, &g);
+  motion_normal_equations(bearings_1, bearings_2, use, sigma_rad, fit.T_2_1, translation_base_1(fit.T_2_1),
+                          &h, &g);
   const Eigen::FullPivLU<Matrix5d> lu(h);
   if (lu.isInvertible()) {
     const Eigen::Matrix2d covariance = lu.inverse().topLeftCorner<2, 2>();
@@ -240,10 +285,10 @@ bool fit_homography(Bearings bearings_1, Bearings bearings_2, Mask used, Eigen::
 }
 
 Eigen::Matrix3d refine_homography(Bearings bearings_1, Bearings bearings_2, double sigma_rad,
-                                  const Eigen::Matrix3d& homography, int rounds) {
+                                  const Eigen::Matrix3d& homography) {
   Eigen::Matrix3d h = homography / homography.norm();
   const double sigma2 = sigma_rad * sigma_rad;
-  for (int round = 0; round < rounds; ++round) {
+  for (const double limit_chi2 : kHomographyLimits_chi2) {
     Matrix9d normal = Matrix9d::Zero();
     Vector9d gradient = Vector9d::Zero();
     for (size_t i = 0; i < bearings_1.size(); ++i) {
@@ -251,7 +296,7 @@ Eigen::Matrix3d refine_homography(Bearings bearings_1, Bearings bearings_2, doub
       if (!(term.forward > 0.0)) continue;
       const Eigen::Matrix2d information = term.covariance.inverse() / sigma2;
       const double r2 = term.c.dot(information * term.c);
-      if (r2 > kUse2Dof) continue;
+      if (r2 > limit_chi2) continue;
       const Matrix29d j = homography_jacobian(term.base_2, bearings_1[i]);
       const Eigen::Matrix2d weight = huber_weight(r2) * information;
       normal.noalias() += j.transpose() * weight * j;

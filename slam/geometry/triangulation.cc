@@ -49,8 +49,9 @@ InverseDepth triangulate_inverse_depth(const Eigen::Vector3d& bearing_host, cons
   const Eigen::Vector3d n = a.cross(t);
   const double t_norm = t.norm();
   if (!(n.norm() > kMinBaselineSine * t_norm) || !(t_norm > 0.0)) return result;
-  // The closest direction is bearing_target projected into the epipolar plane; it is parallel to a + rho t where
-  // n . (bearing_target x (a + rho t)) = 0. (The part of bearing_target along n drops out of this product.)
+  // The closest direction is bearing_target projected into the epipolar plane; it is parallel to a + rho t
+  // where n . (bearing_target x (a + rho t)) = 0. (The part of bearing_target along n drops out of this
+  // product.)
   const double numerator = -n.dot(bearing_target.cross(a));
   const double denominator = n.dot(bearing_target.cross(t));
   const double rho = numerator / denominator;
@@ -60,8 +61,8 @@ InverseDepth triangulate_inverse_depth(const Eigen::Vector3d& bearing_host, cons
   return result;
 }
 
-double inverse_depth_sigma(const Eigen::Vector3d& bearing_host, const SE3& T_target_host, double inverse_depth,
-                           double sigma_target_rad, double sigma_host_rad) {
+double inverse_depth_sigma(const Eigen::Vector3d& bearing_host, const SE3& T_target_host,
+                           double inverse_depth, double sigma_target_rad, double sigma_host_rad) {
   const Eigen::Vector3d a = T_target_host.q * bearing_host;
   const Eigen::Vector3d& t = T_target_host.t;
   const Eigen::Vector3d direction = a + inverse_depth * t;
@@ -74,7 +75,8 @@ double inverse_depth_sigma(const Eigen::Vector3d& bearing_host, const SE3& T_tar
   return std::hypot(sigma_target_rad, host_turn * sigma_host_rad) / turn;
 }
 
-TriangulatedPoint triangulate_dlt(std::span<const Eigen::Vector3d> bearings_c, std::span<const SE3> T_camera_world) {
+TriangulatedPoint triangulate_dlt(std::span<const Eigen::Vector3d> bearings_c,
+                                  std::span<const SE3> T_camera_world) {
   TriangulatedPoint result;
   const size_t n = std::min(bearings_c.size(), T_camera_world.size());
   if (n < 2) return result;

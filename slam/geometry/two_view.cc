@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "slam/geometry/five_point.h"
 #include "slam/geometry/random.h"
@@ -35,7 +36,8 @@ constexpr double kBehindSigmas = 3.0;
 // The homography must beat the essential motion's GRIC by this factor.
 constexpr double kHomographyAdvantage = 0.98;
 
-// Matches as single-precision columns, padded with zeros to whole blocks; a zero match costs nothing in any model.
+// Matches as single-precision columns, padded with zeros to whole blocks; a zero match costs nothing in any
+// model.
 class MatchColumns {
  public:
   MatchColumns(Bearings bearings_1, Bearings bearings_2) {
@@ -48,8 +50,8 @@ class MatchColumns {
     }
   }
 
-  // Sum of min(residual2, limit2) over all matches; stops early, at a value of at least `enough`, once it is reached.
-  // Kernel: (x1, y1, z1, x2, y2, z2 blocks) -> block of squared residuals in rad^2.
+  // Sum of min(residual2, limit2) over all matches; stops early, at a value of at least `enough`, once it is
+  // reached. Kernel: (x1, y1, z1, x2, y2, z2 blocks) -> block of squared residuals in rad^2.
   template <typename Kernel>
   [[nodiscard]] float cost(const Kernel& kernel, float limit2, float enough) const {
     float sum = 0.0F;
@@ -62,7 +64,8 @@ class MatchColumns {
   template <typename Kernel>
   [[nodiscard]] Eigen::Index count(const Kernel& kernel, float limit2) const {
     Eigen::Index total = 0;
-    for (Eigen::Index i = 0; i < columns_.rows(); i += kBlock) total += (residuals2(kernel, i) < limit2).count();
+    for (Eigen::Index i = 0; i < columns_.rows(); i += kBlock)
+      total += (residuals2(kernel, i) < limit2).count();
     return total;
   }
   [[nodiscard]] Eigen::Index padded() const { return columns_.rows(); }
@@ -101,8 +104,8 @@ struct EssentialKernel {
   }
 };
 
-// Half the squared sine between H b1 and b2: the noise of both views counted as if H kept angles. Opposite directions
-// pass here and fail in the exact residual.
+// Half the squared sine between H b1 and b2: the noise of both views counted as if H kept angles. Opposite
+// directions pass here and fail in the exact residual.
 struct TransferKernel {
   Eigen::Matrix3f h;
   Block operator()(const Block& x1, const Block& y1, const Block& z1, const Block& x2, const Block& y2,
@@ -256,13 +259,15 @@ double essential_distance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 // Keeps the best few hypotheses that differ from each other, best first.
 void keep(const EssentialHypothesis& candidate, std::vector<EssentialHypothesis>* kept) {
   for (const EssentialHypothesis& other : *kept) {
-    if (other.cost <= candidate.cost && essential_distance(other.e, candidate.e) < kDifferentEssential) return;
+    if (other.cost <= candidate.cost && essential_distance(other.e, candidate.e) < kDifferentEssential)
+      return;
   }
   std::erase_if(*kept, [&](const EssentialHypothesis& other) {
     return essential_distance(other.e, candidate.e) < kDifferentEssential;
   });
-  const auto place = std::find_if(kept->begin(), kept->end(),
-                                  [&](const EssentialHypothesis& other) { return candidate.cost < other.cost; });
+  const auto place = std::find_if(kept->begin(), kept->end(), [&](const EssentialHypothesis& other) {
+    return candidate.cost < other.cost;
+  });
   kept->insert(place, candidate);
   if (kept->size() > kMaxHypotheses) kept->pop_back();
 }
@@ -279,7 +284,8 @@ std::vector<EssentialHypothesis> find_essentials(const Problem& p) {
     const EssentialCandidates candidates = solve_five_point(s1, s2);
     for (size_t i = 0; i < candidates.count; ++i) {
       const EssentialKernel kernel{candidates.matrix[i].cast<float>()};
-      const float enough = kept.size() < kMaxHypotheses ? std::numeric_limits<float>::max() : kept.back().cost;
+      const float enough =
+          kept.size() < kMaxHypotheses ? std::numeric_limits<float>::max() : kept.back().cost;
       const float cost = p.columns.cost(kernel, p.limit2(kChi2_1Dof), enough);
       if (cost >= enough) continue;
       keep({cost, candidates.matrix[i]}, &kept);
@@ -299,6 +305,7 @@ enum class Side : uint8_t { kFront, kBehind, kNoDepth };
 struct MatchGeometry {
   double chi2 = 0.0;  // epipolar residual
   Side side = Side::kNoDepth;
+  bool supported = true;  // see supported_matches
   double inverse_depth = 0.0;
   double inverse_depth_sigma = 0.0;
   double parallax_rad = 0.0;
@@ -311,11 +318,13 @@ MatchGeometry match_geometry(const SE3& T_2_1, const Eigen::Vector3d& b1, const 
   const InverseDepth depth = triangulate_inverse_depth(b1, T_2_1, b2);
   m.inverse_depth = depth.inverse_depth;
   m.parallax_rad = depth.parallax_rad;
-  m.inverse_depth_sigma = inverse_depth_sigma(b1, T_2_1, std::max(0.0, depth.inverse_depth), sigma_rad, sigma_rad);
+  m.inverse_depth_sigma =
+      inverse_depth_sigma(b1, T_2_1, std::max(0.0, depth.inverse_depth), sigma_rad, sigma_rad);
   if (depth.ok && depth.inverse_depth > 0.0) {
     m.side = Side::kFront;
   } else {
-    // Infinity within the noise, if the rays point the same way; along the baseline there is no depth to be wrong.
+    // Infinity within the noise, if the rays point the same way; along the baseline there is no depth to be
+    // wrong.
     const bool far = (T_2_1.q * b1).dot(b2) > 0.0 && depth.inverse_depth <= 0.0 &&
                      depth.inverse_depth > -kBehindSigmas * m.inverse_depth_sigma;
     m.side = far ? Side::kNoDepth : Side::kBehind;
@@ -323,10 +332,12 @@ MatchGeometry match_geometry(const SE3& T_2_1, const Eigen::Vector3d& b1, const 
   return m;
 }
 
+bool is_inlier(const MatchGeometry& m) {
+  return m.supported && m.chi2 < kChi2_1Dof && m.side != Side::kBehind;
+}
+
 struct Candidate {
   SE3 T_2_1;
-  SE3 unrefined_T_2_1;
-  bool from_homography = false;
   double translation_sigma_rad = 0.0;
   double cost = 0.0;
 };
@@ -359,40 +370,61 @@ SE3 motion_in_front(const Problem& p, const Eigen::Matrix3d& essential) {
   return best;
 }
 
-double rotation_difference_rad(const SE3& a, const SE3& b) { return so3_log(a.q.conjugate() * b.q).norm(); }
+double rotation_difference_rad(const SE3& a, const SE3& b) {
+  return so3_log(a.q.conjugate() * b.q).norm();
+}
 
 bool different(const SE3& a, const SE3& b) {
   return parallax_angle(a.t, b.t) > kDifferentTranslation_rad ||
          rotation_difference_rad(a, b) > kDifferentRotation_rad;
 }
 
-// Motions of both models, each at its own optimum of the epipolar cost, best first.
-std::vector<Candidate> refined_candidates(const Problem& p, const std::vector<EssentialHypothesis>& essentials,
-                                          const HomographyFit& plane) {
-  std::vector<Candidate> candidates;
+// Motions of either model with their costs.
+std::vector<Candidate> plane_motions(const Problem& p, const HomographyFit& plane) {
+  std::vector<Candidate> motions;
+  if (!plane.found) return motions;
+  const PlaneMotions all = decompose_homography(plane.h);
+  for (size_t i = 0; i < all.count; ++i) {
+    motions.push_back({all.motion[i].T_2_1, 0.0, motion_cost(p, all.motion[i].T_2_1)});
+  }
+  return motions;
+}
+
+std::vector<Candidate> essential_motions(const Problem& p,
+                                         const std::vector<EssentialHypothesis>& essentials) {
+  std::vector<Candidate> motions;
   for (const EssentialHypothesis& hypothesis : essentials) {
     const SE3 motion = motion_in_front(p, hypothesis.e);
-    candidates.push_back({motion, motion, false, 0.0, 0.0});
+    motions.push_back({motion, 0.0, motion_cost(p, motion)});
   }
-  if (plane.found) {
-    const PlaneMotions motions = decompose_homography(plane.h);
-    for (size_t i = 0; i < motions.count; ++i) {
-      candidates.push_back({motions.motion[i].T_2_1, motions.motion[i].T_2_1, true, 0.0, 0.0});
-    }
+  return motions;
+}
+
+void sort_by_cost(std::vector<Candidate>* motions) {
+  std::stable_sort(motions->begin(), motions->end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+}
+
+// The best few that differ from each other, each moved to its own optimum of the epipolar cost, best first.
+std::vector<Candidate> refined_candidates(const Problem& p, std::vector<Candidate> motions) {
+  sort_by_cost(&motions);
+  std::vector<Candidate> candidates;
+  for (const Candidate& motion : motions) {
+    const bool known = std::any_of(candidates.begin(), candidates.end(),
+                                   [&](const Candidate& c) { return !different(c.T_2_1, motion.T_2_1); });
+    if (!known && candidates.size() < kMaxHypotheses) candidates.push_back(motion);
   }
   for (Candidate& candidate : candidates) {
     const MotionFit fit = refine_motion(p.b1, p.b2, p.sigma_rad, candidate.T_2_1);
-    candidate.T_2_1 = fit.T_2_1;
-    candidate.translation_sigma_rad = fit.translation_sigma_rad;
-    candidate.cost = motion_cost(p, fit.T_2_1);
+    candidate = {fit.T_2_1, fit.translation_sigma_rad, motion_cost(p, fit.T_2_1)};
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  sort_by_cost(&candidates);
   return candidates;
 }
 
-// Torr's GRIC over the matches that either model explains: residuals truncated at 2 (r - d), plus the price of the
-// structure's dimension d (a point on a plane has 2, in space 3, data dimension r = 4) and of the k parameters.
+// Torr's GRIC over the matches that either model explains: residuals truncated at 2 (r - d), plus the price
+// of the structure's dimension d (a point on a plane has 2, in space 3, data dimension r = 4) and of the k
+// parameters.
 bool plane_is_better(const HomographyFit& plane, const std::vector<MatchGeometry>& general) {
   double cost_plane = 0.0, cost_general = 0.0, n = 0.0;
   for (size_t i = 0; i < general.size(); ++i) {
@@ -411,7 +443,7 @@ bool plane_is_better(const HomographyFit& plane, const std::vector<MatchGeometry
 double observed_variance(const std::vector<MatchGeometry>& geometry) {
   std::vector<double> chi2;
   for (const MatchGeometry& m : geometry) {
-    if (m.chi2 < kChi2_1Dof && m.side != Side::kBehind) chi2.push_back(m.chi2);
+    if (is_inlier(m)) chi2.push_back(m.chi2);
   }
   if (chi2.empty()) return 1.0;
   const auto middle = chi2.begin() + static_cast<std::ptrdiff_t>(chi2.size() / 2);
@@ -421,11 +453,14 @@ double observed_variance(const std::vector<MatchGeometry>& geometry) {
 
 std::vector<MatchGeometry> all_geometry(const Problem& p, const SE3& T_2_1) {
   std::vector<MatchGeometry> geometry(p.size());
-  for (size_t i = 0; i < p.size(); ++i) geometry[i] = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad);
+  const std::vector<uint8_t> supported =
+      supported_matches(p.b1, p.b2, T_2_1, std::sqrt(kChi2_1Dof) * p.sigma_rad);
+  for (size_t i = 0; i < p.size(); ++i) {
+    geometry[i] = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad);
+    geometry[i].supported = supported[i] != 0;
+  }
   return geometry;
 }
-
-bool is_inlier(const MatchGeometry& m) { return m.chi2 < kChi2_1Dof && m.side != Side::kBehind; }
 
 void fill_matches(const std::vector<MatchGeometry>& geometry, TwoViewResult* result) {
   std::vector<double> parallaxes;
@@ -462,7 +497,8 @@ void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewRes
 }
 
 // Share of the matches that the motion explains and the rotation does not, at the noise as it turned out.
-double unexplained_share(const Problem& p, const RotationFit& rotation, const std::vector<MatchGeometry>& geometry) {
+double unexplained_share(const Problem& p, const RotationFit& rotation,
+                         const std::vector<MatchGeometry>& geometry) {
   const double limit = kChi2_2Dof * observed_variance(geometry) * p.sigma_rad * p.sigma_rad;
   size_t explained = 0, unexplained = 0;
   for (size_t i = 0; i < p.size(); ++i) {
@@ -478,31 +514,36 @@ bool enough_inliers(const Problem& p, size_t inliers) {
          static_cast<double>(inliers) >= p.options.min_inlier_share * static_cast<double>(p.size());
 }
 
-// The best motion of the plane itself where the plane is the model: it uses both residuals of each match.
-const Candidate* plane_candidate(const std::vector<Candidate>& candidates) {
-  const auto same = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) {
-    return c.from_homography && !different(c.T_2_1, candidates.front().T_2_1) &&
-           !different(c.unrefined_T_2_1, c.T_2_1);
-  });
-  return same == candidates.end() ? nullptr : &*same;
+// The plane's own motion that agrees with the best one, or null.
+const Candidate* agreeing(const std::vector<Candidate>& on_plane, const SE3& best) {
+  const Candidate* chosen = nullptr;
+  for (const Candidate& c : on_plane) {
+    if (!different(c.T_2_1, best) && (chosen == nullptr || c.cost < chosen->cost)) chosen = &c;
+  }
+  return chosen;
 }
 
 double rival_margin(const std::vector<Candidate>& candidates, double variance) {
   for (const Candidate& c : candidates) {
     if (different(c.T_2_1, candidates.front().T_2_1)) return (c.cost - candidates.front().cost) / variance;
   }
-  return std::numeric_limits<double>::max();
+  return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
 
 const char* name(TwoViewStatus status) {
   switch (status) {
-    case TwoViewStatus::kOk: return "ok";
-    case TwoViewStatus::kTooFewMatches: return "too few matches";
-    case TwoViewStatus::kNoParallax: return "no parallax";
-    case TwoViewStatus::kAmbiguous: return "ambiguous";
-    case TwoViewStatus::kPoorModel: return "poor model";
+    case TwoViewStatus::kOk:
+      return "ok";
+    case TwoViewStatus::kTooFewMatches:
+      return "too few matches";
+    case TwoViewStatus::kNoParallax:
+      return "no parallax";
+    case TwoViewStatus::kAmbiguous:
+      return "ambiguous";
+    case TwoViewStatus::kPoorModel:
+      return "poor model";
   }
   return "unknown";
 }
@@ -523,7 +564,8 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
 
   const RotationFit rotation = find_rotation(p);
   result.rotation_inliers = rotation.inliers;
-  if (static_cast<double>(rotation.inliers) >= (1.0 - options.max_unexplained_share) * static_cast<double>(n)) {
+  if (static_cast<double>(rotation.inliers) >=
+      (1.0 - options.max_unexplained_share) * static_cast<double>(n)) {
     result.unexplained_share = 1.0 - static_cast<double>(rotation.inliers) / static_cast<double>(n);
     set_rotation_only(p, rotation, &result);
     return result;
@@ -532,7 +574,10 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
   const std::vector<EssentialHypothesis> essentials = find_essentials(p);
   const HomographyFit plane = find_homography(p);
   result.homography_inliers = plane.inliers;
-  const std::vector<Candidate> candidates = refined_candidates(p, essentials, plane);
+  const std::vector<Candidate> on_plane = plane_motions(p, plane);
+  std::vector<Candidate> motions = essential_motions(p, essentials);
+  motions.insert(motions.end(), on_plane.begin(), on_plane.end());
+  const std::vector<Candidate> candidates = refined_candidates(p, std::move(motions));
   result.status = TwoViewStatus::kPoorModel;
   if (candidates.empty()) return result;
 
@@ -549,9 +594,10 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
   result.T_2_1 = best.T_2_1;
   result.translation_sigma_rad = best.translation_sigma_rad;
   if (plane.found && plane_is_better(plane, geometry)) {
-    if (const Candidate* on_plane = plane_candidate(candidates)) {
+    // A plane's own motion uses both residuals of every match and is the more accurate one.
+    if (const Candidate* motion = agreeing(on_plane, best.T_2_1)) {
       result.model = TwoViewModel::kHomography;
-      result.T_2_1 = on_plane->unrefined_T_2_1;
+      result.T_2_1 = motion->T_2_1;
       geometry = all_geometry(p, result.T_2_1);
     }
   }

@@ -1,5 +1,5 @@
-// Geometry of two views for automatic initialisation: motion up to scale, inliers and structure from matched bearings
-// with outliers, or the reason why there is none.
+// Geometry of two views for automatic initialisation: motion up to scale, inliers and structure from matched
+// bearings with outliers, or the reason why there is none.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,10 +28,11 @@ struct TwoViewOptions {
   size_t min_matches = 20;
   size_t min_inliers = 20;
   double min_inlier_share = 0.3;
-  // Of the matches that a general motion explains, the share that a rotation does not: at most this, no parallax.
+  // Of the matches that a general motion explains, the share that a rotation does not: at most this, no
+  // parallax.
   double max_unexplained_share = 0.1;
-  // Two motions are equally good where their costs (sums of truncated chi-squares) differ by less than this, in units
-  // of the noise as it turns out: a likelihood ratio of exp(-6).
+  // Two motions are equally good where their costs (sums of truncated chi-squares) differ by less than this,
+  // in units of the noise as it turns out: a likelihood ratio of exp(-6).
   double ambiguity_margin = 12.0;
   double max_translation_sigma_rad = 0.15;
   int max_samples = 400;  // a model; fewer where the inlier share allows
@@ -43,29 +44,31 @@ struct TwoViewResult {
   TwoViewModel model = TwoViewModel::kNone;
   // Unit translation norm. For kNoParallax the rotation with zero translation, for kAmbiguous the best found.
   SE3 T_2_1;
-  // One entry a match. An inlier fits the motion and does not lie behind a view beyond its noise; an inlier without a
-  // valid depth is far away or close to the direction of motion.
+  // One entry a match. An inlier fits the motion and does not lie behind a view beyond its noise; an inlier
+  // without a valid depth is far away or close to the direction of motion.
   std::vector<uint8_t> inlier;
-  std::vector<double> inverse_depth;  // along bearing_1, in 1 / baseline; <= 0: invalid
-  std::vector<double> parallax_rad;   // between the two rays in common axes
-  double median_parallax_rad = 0.0;   // over the inliers with valid depth
-  double translation_sigma_rad = 0.0; // 1-sigma of the direction of translation
+  std::vector<double> inverse_depth;   // along bearing_1, in 1 / baseline; <= 0: invalid
+  std::vector<double> parallax_rad;    // between the two rays in common axes
+  double median_parallax_rad = 0.0;    // over the inliers with valid depth
+  double translation_sigma_rad = 0.0;  // 1-sigma of the direction of translation
   size_t matches = 0;
   size_t inliers = 0;
   size_t valid_depths = 0;
   size_t essential_inliers = 0, homography_inliers = 0, rotation_inliers = 0;
   double unexplained_share = 0.0;  // see max_unexplained_share
-  double rival_cost_margin = 0.0;  // cost of the best different motion minus the best, noise units; large: none
+  double rival_cost_margin =
+      0.0;  // cost of the best different motion minus the best, noise units; large: none
 };
 
-// bearings_1[i] and bearings_2[i] (unit, any field of view) are matched; sigma_rad is the standard deviation of one
-// bearing component in each view (pixel sigma / focal length). Deterministic: equal input gives equal bits.
+// bearings_1[i] and bearings_2[i] (unit, any field of view) are matched; sigma_rad is the standard deviation
+// of one bearing component in each view (pixel sigma / focal length). Deterministic: equal input gives equal
+// bits.
 //
-// Rotation alone, homography and essential motion are each fitted by RANSAC with truncated chi-square costs (MSAC;
-// Torr & Zisserman, CVIU 2000). Homography against essential motion is decided by Torr's GRIC (Torr, Fitzgibbon,
-// Zisserman, IJCV 1999), which weighs residuals of different degrees of freedom. All motions that either model allows
-// are refined and compared by one cost, epipolar residual and cheirality together, so that the twofold solution of a
-// plane is seen as such whichever model found it.
+// Rotation alone, homography and essential motion are each fitted by RANSAC with truncated chi-square costs
+// (MSAC; Torr & Zisserman, CVIU 2000). Homography against essential motion is decided by Torr's GRIC (Torr,
+// Fitzgibbon, Zisserman, IJCV 1999), which weighs residuals of different degrees of freedom. All motions that
+// either model allows are refined and compared by one cost, epipolar residual and cheirality together, so
+// that the twofold solution of a plane is seen as such whichever model found it.
 [[nodiscard]] TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
                                               std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
                                               const TwoViewOptions& options = {});
