@@ -1,8 +1,11 @@
 // Levenberg-Marquardt on the Schur complement of one-dimensional landmarks.
 //
-// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1)
-// / 2 rank-one 6x6 updates; general solvers do not specialise to that (see tests/bench for the comparison
-// with Ceres).
+// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1) / 2
+// rank-one 6x6 updates; general solvers do not specialise to that (tests/bench/bench_solvers.cc compares with Ceres).
+//
+// Pose steps are taken in world axes here, (dt_w, dphi_w) = (R dt, R dphi) with the (dt, dphi) of se3.h: a landmark's
+// derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t, without a rotation for
+// every measurement, and the same for host and target but for the sign.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +16,9 @@ namespace farpoint::slam {
 
 namespace {
 
+using Matrix26d = Eigen::Matrix<double, 2, 6>;
+using Matrix36d = Eigen::Matrix<double, 3, 6>;
+
 double huber_cost(double squared) {
   const double r = std::sqrt(squared);
   return r <= kHuberDelta ? 0.5 * squared : kHuberDelta * (r - 0.5 * kHuberDelta);
@@ -22,14 +28,63 @@ double huber_weight(double squared) {
   return r <= kHuberDelta ? 1.0 : kHuberDelta / r;
 }
 
+// d(xyz) by the pose that carries the point.
+Matrix36d carry(const BundleFrames::WorldPoint& point, const Eigen::Vector3d& t_world_body) {
+  Matrix36d d;
+  d.leftCols<3>() = point.inverse_depth * Eigen::Matrix3d::Identity();
+  d.rightCols<3>() = -skew(point.xyz - point.inverse_depth * t_world_body);
+  return d;
+}
+
+// scale * d_xyz * carry(point, t), without the multiplications by zero.
+Matrix26d carried(const Matrix23d& d_xyz, double scale, const BundleFrames::WorldPoint& point,
+                  const Eigen::Vector3d& t_world_body) {
+  const Eigen::Vector3d y = point.xyz - point.inverse_depth * t_world_body;
+  const Matrix23d d = scale * d_xyz;
+  Matrix26d J;
+  J.leftCols<3>() = point.inverse_depth * d;
+  J.col(3) = d.col(2) * y.y() - d.col(1) * y.z();
+  J.col(4) = d.col(0) * y.z() - d.col(2) * y.x();
+  J.col(5) = d.col(1) * y.x() - d.col(0) * y.y();
+  return J;
+}
+
+// Symmetric matrix of 6x6 blocks, upper triangle, each block in one piece of memory: the rank-one updates of the
+// Schur complement are most of the work, and stay within few cache lines.
+class BlockMatrix {
+ public:
+  void resize(int blocks) {
+    blocks_ = blocks;
+    data_.resize(static_cast<std::size_t>(blocks * (blocks + 1) / 2));
+  }
+  void set_zero() {
+    for (Matrix6d& b : data_) b.setZero();
+  }
+  // row <= column
+  [[nodiscard]] Matrix6d& at(int row, int column) { return data_[index(row, column)]; }
+
+  // Upper triangle of `out`; the rest is untouched.
+  void copy_to(Eigen::MatrixXd* out) const {
+    for (int r = 0; r < blocks_; ++r)
+      for (int c = r; c < blocks_; ++c) out->block<6, 6>(6 * r, 6 * c) = data_[index(r, c)];
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(column * (column + 1) / 2 + row);
+  }
+  int blocks_ = 0;
+  std::vector<Matrix6d> data_;
+};
+
 // A landmark's part of the normal equations.
 struct PointBlock {
-  double hessian = 0, gradient = 0;
+  double hessian = 0, gradient = 0;    // hessian 0: not moved in this step
   int first_coupling = 0, couplings = 0;
 };
 // d2(cost) / d(pose) d(inverse depth) for one free pose.
 struct Coupling {
-  int pose = 0;  // index among the free poses
+  int pose = 0;    // index among the free poses
   Vector6d w = Vector6d::Zero();
 };
 
@@ -43,11 +98,13 @@ class SchurSolver {
         free_poses_.push_back(i);
       }
     const auto n = static_cast<Eigen::Index>(6 * free_poses_.size());
-    hessian_.resize(n, n);
-    reduced_.resize(n, n);
+    hessian_.resize(static_cast<int>(free_poses_.size()));
+    dense_.resize(n, n);
     gradient_.resize(n);
     reduced_gradient_.resize(n);
     blocks_.resize(p_.points.size());
+    couplings_.reserve(p_.measurements.size() + p_.points.size());
+    frames_.update(p_);
   }
 
   BundleSummary run(const BundleOptions& options) {
@@ -84,29 +141,25 @@ class SchurSolver {
   }
 
  private:
-  double cost() const {
+  [[nodiscard]] const BundleProblem::Measurement& measurement(const BundleProblem::Point& point, int i) const {
+    return p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+  }
+
+  [[nodiscard]] double cost() const {
     double sum = 0.0;
-    for (const auto& point : p_.points)
+    for (const auto& point : p_.points) {
+      const BundleFrames::WorldPoint world = frames_.world_point(point);
       for (int i = 0; i < point.measurements; ++i) {
         Eigen::Vector2d r;
-        const auto& m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
-        sum += residual(p_, point, m, &r) ? huber_cost(r.squaredNorm()) : kLostCost;
+        const auto& m = measurement(point, i);
+        sum += residual_world(world, frames_.view(m), m, &r) ? huber_cost(r.squaredNorm()) : kLostCost;
       }
+    }
     return sum;
   }
 
-  Vector6d& coupling(PointBlock* block, int pose) {
-    for (int i = 0; i < block->couplings; ++i) {
-      Coupling& c = couplings_[static_cast<std::size_t>(block->first_coupling + i)];
-      if (c.pose == pose) return c.w;
-    }
-    couplings_.push_back({pose, Vector6d::Zero()});
-    ++block->couplings;
-    return couplings_.back().w;
-  }
-
   void linearise_all() {
-    hessian_.setZero();
+    hessian_.set_zero();
     gradient_.setZero();
     couplings_.clear();
     for (std::size_t k = 0; k < p_.points.size(); ++k) linearise_point(p_.points[k], &blocks_[k]);
@@ -116,70 +169,102 @@ class SchurSolver {
     *block = {};
     block->first_coupling = static_cast<int>(couplings_.size());
     const int host = free_index_[static_cast<std::size_t>(point.host)];
+    const BundleFrames::WorldPoint world = frames_.world_point(point);
+    const Eigen::Vector3d& t_host = frames_.body(point.host).t_world_body;
+    // The host's derivatives are carry(host) times these sums over all measurements.
+    Eigen::Matrix3d host_hessian = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d host_gradient = Eigen::Vector3d::Zero(), host_coupling = Eigen::Vector3d::Zero();
     for (int i = 0; i < point.measurements; ++i) {
-      const auto& m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
-      BundleLinearisation lin;
-      if (!linearise(p_, point, m, &lin)) continue;
+      const auto& m = measurement(point, i);
+      WorldLinearisation lin;
+      if (!linearise_world(world, frames_.view(m), m, &lin)) continue;
       const double w = huber_weight(lin.residual.squaredNorm());
       block->hessian += w * lin.d_inverse_depth.squaredNorm();
       block->gradient += w * lin.d_inverse_depth.dot(lin.residual);
+      if (m.pose == point.host) continue;    // host and target move together: nothing changes
       const int target = free_index_[static_cast<std::size_t>(m.pose)];
-      if (point.host == m.pose) continue;
-      if (host >= 0) add_pose(host, lin.d_host, lin, w, block);
-      if (target >= 0) add_pose(target, lin.d_target, lin, w, block);
-      if (host >= 0 && target >= 0) {
-        // Only the upper triangle is kept.
-        if (host < target)
-          hessian_.block<6, 6>(6 * host, 6 * target).noalias() += w * lin.d_host.transpose() * lin.d_target;
-        else
-          hessian_.block<6, 6>(6 * target, 6 * host).noalias() += w * lin.d_target.transpose() * lin.d_host;
+      if (host >= 0) {
+        const Eigen::Matrix<double, 3, 2> weighted = w * lin.d_xyz.transpose();
+        host_hessian.noalias() += weighted * lin.d_xyz;
+        host_gradient.noalias() += weighted * lin.residual;
+        host_coupling.noalias() += weighted * lin.d_inverse_depth;
       }
+      if (target < 0) continue;
+      const Matrix26d J = carried(lin.d_xyz, -1.0, world, frames_.body(m.pose).t_world_body);
+      const Matrix26d weighted = w * J;
+      hessian_.at(target, target).noalias() += J.transpose() * weighted;
+      gradient_.segment<6>(6 * target).noalias() += weighted.transpose() * lin.residual;
+      add_coupling(target, weighted.transpose() * lin.d_inverse_depth, block);
+      if (host < 0) continue;
+      const Matrix26d J_host = carried(lin.d_xyz, 1.0, world, t_host);
+      if (host < target)
+        hessian_.at(host, target).noalias() += J_host.transpose() * weighted;
+      else
+        hessian_.at(target, host).noalias() += weighted.transpose() * J_host;
     }
+    if (host >= 0) {
+      const Matrix36d d = carry(world, t_host);
+      hessian_.at(host, host).noalias() += d.transpose() * (host_hessian * d);
+      gradient_.segment<6>(6 * host).noalias() += d.transpose() * host_gradient;
+      add_coupling(host, d.transpose() * host_coupling, block);
+    }
+    // At infinity already and asked to go beyond: it stays, and the poses do not count on its going.
+    if (point.inverse_depth <= 0.0 && block->gradient > 0.0) block->hessian = 0.0;
   }
 
-  void add_pose(int pose, const Eigen::Matrix<double, 2, 6>& J, const BundleLinearisation& lin, double w,
-                PointBlock* block) {
-    hessian_.block<6, 6>(6 * pose, 6 * pose).noalias() += w * J.transpose() * J;
-    gradient_.segment<6>(6 * pose).noalias() += w * J.transpose() * lin.residual;
-    coupling(block, pose).noalias() += w * J.transpose() * lin.d_inverse_depth;
+  // Keeps a landmark's couplings in ascending order of poses; there are few.
+  void add_coupling(int pose, const Vector6d& w, PointBlock* block) {
+    const auto first = couplings_.begin() + block->first_coupling;
+    auto at = couplings_.end();
+    while (at != first && std::prev(at)->pose > pose) --at;
+    if (at != first && std::prev(at)->pose == pose) {
+      std::prev(at)->w += w;
+      return;
+    }
+    couplings_.insert(at, {pose, w});
+    ++block->couplings;
   }
 
   // Damped normal equations, inverse depths eliminated. False where the system is not positive definite.
   bool solve(double lambda) {
     reduced_ = hessian_;
     reduced_gradient_ = gradient_;
-    for (Eigen::Index i = 0; i < reduced_.rows(); ++i)
-      reduced_(i, i) += lambda * std::clamp(hessian_(i, i), 1e-6, 1e32);
-    for (const PointBlock& b : blocks_) {
-      if (b.hessian <= 0.0) continue;
-      const double inverse = 1.0 / (b.hessian * (1.0 + lambda));
-      const Coupling* c = couplings_.data() + b.first_coupling;
-      for (int i = 0; i < b.couplings; ++i) {
-        const Vector6d scaled = inverse * c[i].w;
-        reduced_gradient_.segment<6>(6 * c[i].pose) -= scaled * b.gradient;
-        for (int j = 0; j < b.couplings; ++j)
-          if (c[i].pose <= c[j].pose)
-            reduced_.block<6, 6>(6 * c[i].pose, 6 * c[j].pose).noalias() -= scaled * c[j].w.transpose();
+    for (int i = 0; i < static_cast<int>(free_poses_.size()); ++i)
+      for (int k = 0; k < 6; ++k) {
+        double& d = reduced_.at(i, i)(k, k);
+        d += lambda * std::clamp(d, 1e-6, 1e32);
       }
-    }
-    if (reduced_.rows() > 0) {
-      const Eigen::LLT<Eigen::MatrixXd, Eigen::Upper> factor(reduced_);
+    for (const PointBlock& b : blocks_)
+      if (b.hessian > 0.0) eliminate(b, 1.0 / (b.hessian * (1.0 + lambda)));
+    pose_step_.resize(reduced_gradient_.size());
+    if (pose_step_.size() > 0) {
+      reduced_.copy_to(&dense_);
+      const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Upper> factor(dense_);
       if (factor.info() != Eigen::Success) return false;
       pose_step_ = factor.solve(-reduced_gradient_);
       if (!pose_step_.allFinite()) return false;
-    } else {
-      pose_step_.resize(0);
     }
     point_step_.assign(blocks_.size(), 0.0);
-    for (std::size_t k = 0; k < blocks_.size(); ++k) {
-      const PointBlock& b = blocks_[k];
-      if (b.hessian <= 0.0) continue;
-      double right = -b.gradient;
-      const Coupling* c = couplings_.data() + b.first_coupling;
-      for (int i = 0; i < b.couplings; ++i) right -= c[i].w.dot(pose_step_.segment<6>(6 * c[i].pose));
-      point_step_[k] = right / (b.hessian * (1.0 + lambda));
-    }
+    for (std::size_t k = 0; k < blocks_.size(); ++k)
+      if (blocks_[k].hessian > 0.0) point_step_[k] = step_of(blocks_[k], lambda);
     return true;
+  }
+
+  void eliminate(const PointBlock& b, double inverse_hessian) {
+    const Coupling* c = couplings_.data() + b.first_coupling;
+    for (int j = 0; j < b.couplings; ++j) {
+      const Vector6d scaled = inverse_hessian * c[j].w;
+      reduced_gradient_.segment<6>(6 * c[j].pose) -= scaled * b.gradient;
+      for (int i = 0; i <= j; ++i)
+        reduced_.at(c[i].pose, c[j].pose).noalias() -= c[i].w * scaled.transpose();
+    }
+  }
+
+  [[nodiscard]] double step_of(const PointBlock& b, double lambda) const {
+    double right = -b.gradient;
+    const Coupling* c = couplings_.data() + b.first_coupling;
+    for (int i = 0; i < b.couplings; ++i) right -= c[i].w.dot(pose_step_.segment<6>(6 * c[i].pose));
+    return right / (b.hessian * (1.0 + lambda));
   }
 
   void save() {
@@ -192,24 +277,30 @@ class SchurSolver {
     for (std::size_t i = 0; i < free_poses_.size(); ++i)
       p_.poses[free_poses_[i]].T_world_body = saved_poses_[i];
     for (std::size_t k = 0; k < p_.points.size(); ++k) p_.points[k].inverse_depth = saved_depths_[k];
+    frames_.update(p_);
   }
   void apply() {
     for (std::size_t i = 0; i < free_poses_.size(); ++i) {
       SE3& T = p_.poses[free_poses_[i]].T_world_body;
-      T = T.boxplus(pose_step_.segment<6>(static_cast<Eigen::Index>(6 * i)));
+      const auto first = static_cast<Eigen::Index>(6 * i);
+      T.t += pose_step_.segment<3>(first);
+      T.q = (so3_exp(pose_step_.segment<3>(first + 3)) * T.q).normalized();
     }
     // Nothing lies beyond infinity.
     for (std::size_t k = 0; k < p_.points.size(); ++k)
       p_.points[k].inverse_depth = std::max(0.0, p_.points[k].inverse_depth + point_step_[k]);
+    frames_.update(p_);
   }
 
   BundleProblem& p_;
+  BundleFrames frames_;
   std::vector<int> free_index_;
   std::vector<std::size_t> free_poses_;
-  Eigen::MatrixXd hessian_, reduced_;
+  BlockMatrix hessian_, reduced_;
+  Eigen::MatrixXd dense_;
   Eigen::VectorXd gradient_, reduced_gradient_, pose_step_;
   std::vector<PointBlock> blocks_;
-  std::vector<Coupling> couplings_;
+  std::vector<Coupling> couplings_;    // grouped by point
   std::vector<double> point_step_;
   std::vector<SE3> saved_poses_;
   std::vector<double> saved_depths_;

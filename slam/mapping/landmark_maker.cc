@@ -1,0 +1,370 @@
+#include "slam/mapping/landmark_maker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/geometry/triangulation.h"
+#include "slam/map/predict.h"
+#include "slam/mapping/measurement.h"
+
+namespace farpoint::slam {
+
+namespace {
+
+constexpr double kChi2TwoDof = 5.99;
+// Depth of the nearest points searched for, as a share of the median depth of what the keyframe sees: nearer ones
+// leave the image before they are of use.
+constexpr double kNearShare = 0.15;
+// A feature pair whose depth says it should look so much larger or smaller than it does is a mismatch.
+constexpr double kScaleTolerance = 1.8;
+// Orientation of a corner repeats to about 10 degrees; three times that, with the frame's roll taken as small.
+constexpr float kMaxAngleDifference_rad = 0.6F;
+// Poses of neighbouring keyframes are known to about this much in the image.
+constexpr double kPoseSigma_px = 0.5;
+constexpr std::uint64_t kBearingLife_keyframes = 12;
+constexpr int kMaxFailures = 3;
+
+float angle_difference(float a, float b) {
+  const float d = std::fabs(a - b);
+  return d > 3.14159265F ? 6.2831853F - d : d;
+}
+
+}  // namespace
+
+LandmarkMaker::LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts)
+    : config_(config), map_(*map), counts_(*counts) {}
+
+bool LandmarkMaker::wanted(LandmarkHandle handle) const {
+  if (handle.is_null()) return true;
+  const Landmark* l = map_.landmarks().get(handle);
+  return l != nullptr && l->state == LandmarkState::kBearing;
+}
+
+void LandmarkMaker::process(KeyframeHandle newer, const std::vector<KeyframeHandle>& neighbours) {
+  for (const KeyframeHandle older : neighbours) {
+    const Keyframe& k_new = map_.keyframes()[newer];
+    const Keyframe& k_old = map_.keyframes()[older];
+    if (!k_old.image || k_old.camera != k_new.camera) continue;
+    const PairGeometry geometry = relate(k_new, k_old);
+    if (!geometry.valid) continue;
+    find_pairs(k_new, k_old, geometry, &pairs_);
+    for (const Pair& pair : pairs_) consume(newer, older, geometry, pair);
+  }
+}
+
+LandmarkMaker::PairGeometry LandmarkMaker::relate(const Keyframe& newer, const Keyframe& older) const {
+  PairGeometry g;
+  g.T_new_old = map_.T_world_camera(newer).inverse() * map_.T_world_camera(older);
+  const double baseline = g.T_new_old.t.norm();
+  // Depth of the scene as the older keyframe sees it.
+  std::vector<double> inverse_depths;
+  const SE3 T_old_world = map_.T_world_camera(older).inverse();
+  for (const LandmarkHandle h : older.landmarks) {
+    const Landmark* l = map_.landmarks().get(h);
+    if (l == nullptr || l->state == LandmarkState::kBearing) continue;
+    const Eigen::Vector4d p = map_.world_point(*l);
+    const double distance = (T_old_world.q * p.head<3>() + p[3] * T_old_world.t).norm();
+    inverse_depths.push_back(p[3] / std::max(distance, 1e-9));
+  }
+  if (inverse_depths.size() < 10) return g;
+  const auto middle = inverse_depths.begin() + static_cast<std::ptrdiff_t>(inverse_depths.size() / 2);
+  std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
+  const double median_inverse_depth = *middle;
+  g.max_inverse_depth = median_inverse_depth / kNearShare;
+  g.epipole_old = g.T_new_old.inverse().t;
+  // Without a base there is neither an epipolar line nor parallax.
+  g.valid = baseline * median_inverse_depth > 0.002;
+  return g;
+}
+
+int LandmarkMaker::search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older,
+                                   const PairGeometry& g, int* distance) const {
+  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(older.camera)].camera;
+  const Feature& f = newer.set.features[feature];
+  const SE3 T_old_new = g.T_new_old.inverse();
+  const Eigen::Vector3d far = T_old_new.q * newer.bearings[feature].cast<double>();
+  // The epipolar segment from infinity to the nearest depth, in pixels of the older keyframe.
+  Eigen::Vector2d a, b;
+  if (!camera.project(far, &a)) return -1;
+  double rho = g.max_inverse_depth;
+  bool visible = camera.project(far + rho * T_old_new.t, &b);
+  for (int i = 0; i < 6 && !visible; ++i) {
+    rho *= 0.5;
+    visible = camera.project(far + rho * T_old_new.t, &b);
+  }
+  if (!visible) return -1;
+  const float scale = static_cast<float>(std::pow(config_.pyramid.scale_factor, f.level));
+  const float band_px = 3.0F * scale;
+  const Eigen::Vector2d along = b - a;
+  const double length = along.norm();
+  const Eigen::Vector2d unit = length > 1e-6 ? Eigen::Vector2d(along / length) : Eigen::Vector2d(1.0, 0.0);
+  const Eigen::Vector2d normal(-unit.y(), unit.x());
+  constexpr double kStep_px = 24.0;
+  const int steps = std::min(64, static_cast<int>(length / kStep_px) + 1);
+
+  int best = -1, best_distance = config_.tracking.max_hamming + 1, second = 257;
+  for (int s = 0; s < steps; ++s) {
+    const double from = length * s / steps, to = length * (s + 1) / steps;
+    const Eigen::Vector2d middle = a + 0.5 * (from + to) * unit;
+    const auto radius = static_cast<float>(0.5 * (to - from)) + band_px;
+    older.grid.visit_near(
+        older.set.features, static_cast<float>(middle.x()), static_cast<float>(middle.y()), radius, f.level - 3,
+        f.level + 3, [&](std::size_t i) {
+          const Feature& o = older.set.features[i];
+          const Eigen::Vector2d d = Eigen::Vector2d(o.u_px, o.v_px) - a;
+          const double t = d.dot(unit);
+          if (t < from - band_px || t > to + band_px || std::fabs(d.dot(normal)) > band_px) return;
+          if (!wanted(older.landmarks[i])) return;
+          if (angle_difference(f.angle_rad, o.angle_rad) > kMaxAngleDifference_rad) return;
+          const int h = hamming_distance(newer.set.descriptors[feature], older.set.descriptors[i]);
+          if (static_cast<int>(i) == best) return;
+          if (h < best_distance) {
+            if (best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o)) second = best_distance;
+            best_distance = h;
+            best = static_cast<int>(i);
+          } else if (h < second && best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o)) {
+            second = h;
+          }
+        });
+  }
+  if (best < 0 || static_cast<float>(best_distance) > 0.85F * static_cast<float>(second)) return -1;
+  *distance = best_distance;
+  return best;
+}
+
+void LandmarkMaker::find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
+                               std::vector<Pair>* out) {
+  out->clear();
+  best_of_old_.assign(older.set.features.size(), -1);
+  for (std::size_t i = 0; i < newer.set.features.size(); ++i) {
+    if (!wanted(newer.landmarks[i])) continue;
+    // A VMP that the older keyframe sees already has nothing to find there.
+    if (const Landmark* l = map_.landmarks().get(newer.landmarks[i]); l != nullptr) {
+      bool seen = false;
+      for (const Observation& o : l->observations) seen = seen || &map_.keyframes()[o.keyframe] == &older;
+      if (seen) continue;
+    }
+    int distance = 0;
+    const int j = search_epipolar(newer, i, older, geometry, &distance);
+    if (j < 0) continue;
+    int& best = best_of_old_[static_cast<std::size_t>(j)];
+    const Pair pair{i, static_cast<std::size_t>(j), distance};
+    if (best < 0) {
+      best = static_cast<int>(out->size());
+      out->push_back(pair);
+    } else if (distance < (*out)[static_cast<std::size_t>(best)].distance) {
+      (*out)[static_cast<std::size_t>(best)] = pair;
+    }
+  }
+}
+
+void LandmarkMaker::consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry,
+                            const Pair& pair) {
+  // Earlier pairs may have changed what hangs on these features.
+  const LandmarkHandle at_new = map_.keyframes()[newer].landmarks[pair.feature_new];
+  const LandmarkHandle at_old = map_.keyframes()[older].landmarks[pair.feature_old];
+  if (!wanted(at_new) || !wanted(at_old)) return;
+  if (at_new.is_null() && at_old.is_null()) {
+    create(newer, older, geometry, pair);
+  } else if (at_old.is_null()) {
+    attach(at_new, older, pair.feature_old);
+  } else if (at_new.is_null()) {
+    attach(at_old, newer, pair.feature_new);
+  } else if (at_new != at_old) {
+    merge(at_old, at_new);
+  }
+}
+
+void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& g, const Pair& pair) {
+  const Keyframe& k_new = map_.keyframes()[newer];
+  const Keyframe& k_old = map_.keyframes()[older];
+  const Eigen::Vector3d f_new = k_new.bearings[pair.feature_new].cast<double>();
+  const Eigen::Vector3d f_old = k_old.bearings[pair.feature_old].cast<double>();
+  const InverseDepth first = triangulate_inverse_depth(f_old, g.T_new_old, f_new);
+  const double parallax_rad = parallax_angle(g.T_new_old.q * f_old, f_new);
+  const bool baseline = config_.landmarks.mode == LandmarkMode::kBaseline;
+  if (baseline && (parallax_rad < config_.landmarks.promote_parallax_rad || !first.ok)) return;
+
+  const LandmarkHandle handle = map_.add_landmark(older, pair.feature_old);
+  if (handle.is_null()) return;
+  Landmark& l = map_.landmarks()[handle];
+  l.inverse_depth = first.ok ? std::max(0.0, first.inverse_depth) : 0.0;
+  l.created_keyframe = k_new.id;
+  Observation o;
+  if (!measure_observation(config_, map_, l, newer, pair.feature_new, &o) || !map_.add_observation(handle, o)) {
+    map_.remove_landmark(handle);
+    return;
+  }
+  try_promote(handle, false);
+  const Landmark* made = map_.landmarks().get(handle);
+  if (made == nullptr) return;
+  if (made->state != LandmarkState::kBearing) return;
+  if (baseline)
+    map_.remove_landmark(handle);
+  else
+    ++counts_.vmp_made;
+}
+
+void LandmarkMaker::attach(LandmarkHandle handle, KeyframeHandle keyframe, std::size_t feature) {
+  const Landmark& l = map_.landmarks()[handle];
+  Observation o;
+  if (!measure_observation(config_, map_, l, keyframe, feature, &o) || !map_.add_observation(handle, o)) return;
+  ++counts_.vmp_attached;
+  try_promote(handle, true);
+}
+
+void LandmarkMaker::merge(LandmarkHandle into, LandmarkHandle from) {
+  // Consistent when the patch of the one is found where the other was seen, in each of its keyframes.
+  const Landmark source = map_.landmarks()[from];
+  std::vector<Observation> moved;
+  for (const Observation& o : source.observations) {
+    if (o.feature < 0 || Map::find_observation(map_.landmarks()[into], o.keyframe) != nullptr) continue;
+    Observation measured;
+    if (!measure_observation(config_, map_, map_.landmarks()[into], o.keyframe, static_cast<std::size_t>(o.feature),
+                             &measured))
+      return;
+    moved.push_back(measured);
+  }
+  map_.remove_landmark(from);
+  for (const Observation& o : moved) map_.add_observation(into, o);
+  ++counts_.vmp_merged;
+  try_promote(into, true);
+}
+
+LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
+  DepthFit fit;
+  const SE3 T_world_anchor = map_.T_world_anchor(l);
+  struct View {
+    const Camera* camera;
+    SE3 T_camera_anchor;
+    const Observation* observation;
+  };
+  std::vector<View> views;
+  views.reserve(l.observations.size());
+  for (const Observation& o : l.observations) {
+    if (o.sigma_px <= 0.0F) continue;
+    const Keyframe& k = map_.keyframes()[o.keyframe];
+    const RigCamera& camera = map_.rig().cameras[static_cast<std::size_t>(k.camera)];
+    views.push_back({&camera.camera, map_.T_world_camera(k).inverse() * T_world_anchor, &o});
+  }
+  // Start from the best pair, then Gauss-Newton on the one unknown.
+  double rho = l.inverse_depth;
+  double best_base = -1.0;
+  for (const View& v : views) {
+    Eigen::Vector3d bearing;
+    const double base = v.T_camera_anchor.t.cross(v.T_camera_anchor.q * l.bearing).norm();
+    if (base <= best_base || !v.camera->unproject(v.observation->pixel.cast<double>(), &bearing)) continue;
+    best_base = base;
+    rho = std::max(0.0, triangulate_inverse_depth(l.bearing, v.T_camera_anchor, bearing).inverse_depth);
+  }
+  double information = 0.0;
+  for (int iteration = 0; iteration < 6; ++iteration) {
+    information = 0.0;
+    double gradient = 0.0;
+    fit.max_chi2 = 0.0;
+    fit.worst = {};
+    for (const View& v : views) {
+      const Eigen::Vector3d p = v.T_camera_anchor.q * l.bearing + rho * v.T_camera_anchor.t;
+      Eigen::Vector2d pixel;
+      Matrix23d J;
+      const double variance = static_cast<double>(v.observation->sigma_px * v.observation->sigma_px) +
+                              kPoseSigma_px * kPoseSigma_px;
+      if (!v.camera->project(p, &pixel, &J)) {
+        fit.max_chi2 = 1e9;
+        fit.worst = v.observation->keyframe;
+        continue;
+      }
+      const Eigen::Vector2d r = pixel - v.observation->pixel.cast<double>();
+      const Eigen::Vector2d d = J * v.T_camera_anchor.t;
+      information += d.squaredNorm() / variance;
+      gradient += d.dot(r) / variance;
+      const double chi2 = r.squaredNorm() / variance;
+      if (chi2 > fit.max_chi2) fit.max_chi2 = chi2, fit.worst = v.observation->keyframe;
+    }
+    if (information <= 0.0) return fit;
+    const double step = -gradient / information;
+    if (rho + step < 0.0 && rho == 0.0) break;
+    rho = std::max(0.0, rho + step);
+    if (std::fabs(step) < 1e-3 / std::sqrt(information)) break;
+  }
+  fit.inverse_depth = rho;
+  fit.sigma = 1.0 / std::sqrt(information);
+  fit.ok = fit.max_chi2 < kChi2TwoDof;
+  return fit;
+}
+
+bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
+  if (config_.landmarks.mode == LandmarkMode::kBaseline) return l.max_parallax_rad > config_.landmarks.promote_parallax_rad;
+  return fit.sigma < config_.landmarks.promote_relative_sigma * fit.inverse_depth;
+}
+
+void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
+  Landmark& l = map_.landmarks()[handle];
+  const DepthFit fit = fit_depth(l);
+  if (!fit.ok) {
+    // The worst observation goes; after a few failures all of it.
+    ++l.failures;
+    if (l.failures >= kMaxFailures || l.observations.size() <= 2) {
+      map_.remove_landmark(handle);
+      if (through_vmp) ++counts_.vmp_rejected;
+    } else if (!map_.remove_observation(handle, fit.worst) && through_vmp) {
+      ++counts_.vmp_rejected;
+    }
+    return;
+  }
+  l.inverse_depth = fit.inverse_depth;
+  l.inverse_depth_sigma = fit.sigma;
+  if (!enough_information(l, fit)) return;
+
+  // Size in the images against size by depth.
+  const Observation& newest = l.observations.back();
+  const Keyframe& k = map_.keyframes()[newest.keyframe];
+  const SE3 T_camera_anchor = map_.T_world_camera(k).inverse() * map_.T_world_anchor(l);
+  const double scale_change = 1.0 / (T_camera_anchor.q * l.bearing + l.inverse_depth * T_camera_anchor.t).norm();
+  const int level = k.set.features[static_cast<std::size_t>(newest.feature)].level;
+  const double seen_change = std::pow(config_.pyramid.scale_factor, level - l.host_level);
+  const double ratio = scale_change / seen_change;
+  if (ratio > kScaleTolerance || ratio < 1.0 / kScaleTolerance) {
+    map_.remove_landmark(handle);
+    if (through_vmp) ++counts_.vmp_rejected;
+    return;
+  }
+  l.state = l.observations.size() > 2 ? LandmarkState::kFull : LandmarkState::kWeak;
+  l.through_vmp = through_vmp;
+  l.created_keyframe = std::max(l.created_keyframe, k.id);
+  l.creation_depth = 1.0 / (scale_change * l.inverse_depth);
+  l.creation_relative_sigma = fit.sigma / fit.inverse_depth;
+  ++counts_.landmarks_made;
+  if (through_vmp) ++counts_.vmp_promoted;
+}
+
+void LandmarkMaker::evict_bearings(KeyframeHandle newest) {
+  const std::uint64_t now = map_.keyframes()[newest].id;
+  const std::int32_t map_id = map_.keyframes()[newest].map_id;
+  struct Aged {
+    LandmarkHandle handle;
+    std::uint64_t last_seen;
+    double parallax_rad;
+  };
+  std::vector<Aged> alive;
+  map_.landmarks().for_each([&](LandmarkHandle h, const Landmark& l) {
+    if (l.state != LandmarkState::kBearing) return;
+    if (l.map_id != map_id || l.last_seen_keyframe + kBearingLife_keyframes < now) {
+      map_.remove_landmark(h);
+      ++counts_.vmp_evicted;
+      return;
+    }
+    alive.push_back({h, l.last_seen_keyframe, l.max_parallax_rad});
+  });
+  const auto limit = static_cast<std::size_t>(config_.landmarks.max_bearing);
+  if (alive.size() <= limit) return;
+  std::stable_sort(alive.begin(), alive.end(), [](const Aged& a, const Aged& b) {
+    return a.last_seen != b.last_seen ? a.last_seen < b.last_seen : a.parallax_rad < b.parallax_rad;
+  });
+  for (std::size_t i = 0; i + limit < alive.size(); ++i) {
+    map_.remove_landmark(alive[i].handle);
+    ++counts_.vmp_evicted;
+  }
+}
+
+}  // namespace farpoint::slam

@@ -1,0 +1,64 @@
+// Algorithm 1 of Dou et al. 2024 as METHOD.md reads it: feature pairs between a new keyframe and its neighbours become
+// map points at once where the parallax suffices, and virtual map points (VMP, here landmarks of state `bearing`) that
+// wait for parallax where it does not.
+#pragma once
+
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/map.h"
+#include "slam/mapping/statistics.h"
+
+namespace farpoint::slam {
+
+class LandmarkMaker {
+ public:
+  LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts);
+
+  // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes landmarks.
+  void process(KeyframeHandle keyframe, const std::vector<KeyframeHandle>& neighbours);
+  // Gives back the slots of VMPs not seen for a while, and of the least useful ones beyond the limit.
+  void evict_bearings(KeyframeHandle newest);
+
+  // Inverse depth from every observation, given the poses. False where it is behind a camera or an observation
+  // disagrees (chi-square); *worst is then the one that disagrees most.
+  struct DepthFit {
+    bool ok = false;
+    double inverse_depth = 0, sigma = 0, max_chi2 = 0;
+    KeyframeHandle worst;
+  };
+  [[nodiscard]] DepthFit fit_depth(const Landmark& landmark) const;
+
+ private:
+  // Two features that show the same point, as far as descriptors, the epipolar line and alignment can tell.
+  struct Pair {
+    std::size_t feature_new = 0, feature_old = 0;
+    int distance = 0;
+  };
+  struct PairGeometry {
+    SE3 T_new_old;                  // cameras
+    Eigen::Vector3d epipole_old;    // centre of the new camera seen from the old one
+    double max_inverse_depth = 0;   // nearest depth searched
+    bool valid = false;
+  };
+
+  [[nodiscard]] PairGeometry relate(const Keyframe& newer, const Keyframe& older) const;
+  void find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry, std::vector<Pair>* out);
+  int search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older, const PairGeometry& geometry,
+                      int* distance) const;
+  void consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
+  void create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
+  void attach(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature);
+  void merge(LandmarkHandle a, LandmarkHandle b);
+  void try_promote(LandmarkHandle landmark, bool through_vmp);
+  [[nodiscard]] bool enough_information(const Landmark& landmark, const DepthFit& fit) const;
+  [[nodiscard]] bool wanted(LandmarkHandle handle) const;
+
+  const EstimatorConfig& config_;
+  Map& map_;
+  MappingCounts& counts_;
+  std::vector<Pair> pairs_;
+  std::vector<int> best_of_old_;      // one a feature of the older keyframe: index in pairs_
+};
+
+}  // namespace farpoint::slam

@@ -1,0 +1,510 @@
+#include "slam/mapping/mapper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/map/predict.h"
+#include "slam/mapping/measurement.h"
+
+namespace farpoint::slam {
+
+namespace {
+
+// A landmark on probation goes when it was found in fewer than this share of the frames that should have shown it.
+constexpr double kMinFoundShare = 0.25;
+constexpr std::uint64_t kProbation_keyframes = 3;
+
+}  // namespace
+
+Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
+    : config_(config), rig_(rig), map_(config.capacity, rig), maker_(config_, &map_, &counts_) {
+  pose_index_.assign(static_cast<std::size_t>(config.capacity.keyframes), -1);
+}
+
+KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id) {
+  Keyframe k;
+  k.map_id = map_id;
+  k.utime = frame.utime;
+  k.frame_number = frame.number;
+  k.camera = frame.camera;
+  k.T_world_body = T_world_body;
+  k.set = frame.set;
+  k.grid = frame.grid;
+  k.image = frame.image;
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)].camera;
+  k.bearings.reserve(k.set.features.size());
+  for (const Feature& f : k.set.features) {
+    Eigen::Vector3d b = Eigen::Vector3d::UnitZ();
+    // A corner without a ray (outside the lens circle) keeps a bearing that no epipolar search will match.
+    if (!camera.unproject({f.u_px, f.v_px}, &b)) b = -Eigen::Vector3d::UnitZ();
+    k.bearings.push_back(b.cast<float>());
+  }
+  const KeyframeHandle handle = map_.add_keyframe(std::move(k));
+  if (!handle.is_null()) {
+    ++counts_.keyframes_made;
+    newest_ = handle;
+    newest_id_ = map_.keyframes()[handle].id;
+  }
+  return handle;
+}
+
+std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std::int32_t map_id) {
+  settled_ = false;
+  steady_optimisations_ = 0;
+  recent_.clear();
+  const KeyframeHandle first = make_keyframe(*pair.first, SE3{}, map_id);
+  const KeyframeHandle second = make_keyframe(*pair.second, pair.T_first_second, map_id);
+  if (first.is_null() || second.is_null()) {
+    map_.discard_map(map_id);
+    return nullptr;
+  }
+  const Keyframe& k2 = map_.keyframes()[second];
+  for (const InitialPoint& p : pair.points) {
+    const LandmarkHandle handle = map_.add_landmark(first, p.feature_first);
+    if (handle.is_null()) continue;
+    Landmark& l = map_.landmarks()[handle];
+    l.inverse_depth = p.inverse_depth;
+    l.state = LandmarkState::kFull;
+    l.created_keyframe = k2.id;
+    const Eigen::Vector4d w = map_.world_point(l);
+    l.creation_depth = (w.head<3>() / w[3] - k2.T_world_body.t).norm();
+    Observation o;
+    if (!measure_observation(config_, map_, l, second, p.feature_second, &o)) {
+      map_.remove_landmark(handle);
+      continue;
+    }
+    if (!map_.add_observation(handle, o))
+      map_.remove_landmark(handle);
+    else
+      ++counts_.landmarks_made;
+  }
+  map_.update_covisibility(second);
+  optimise(second, 20);
+  std::size_t alive = 0;
+  map_.landmarks().for_each([&](LandmarkHandle, const Landmark& l) { alive += l.map_id == map_id ? 1U : 0U; });
+  if (alive < static_cast<std::size_t>(config_.initialisation.min_landmarks) / 2) {
+    map_.discard_map(map_id);
+    return nullptr;
+  }
+  map_.landmarks().for_each([&](LandmarkHandle, Landmark& l) {
+    if (l.map_id == map_id) l.creation_relative_sigma = l.inverse_depth_sigma / std::max(l.inverse_depth, 1e-9);
+  });
+  return make_view(second);
+}
+
+std::vector<KeyframeHandle> Mapper::neighbours(KeyframeHandle keyframe, std::size_t limit) const {
+  std::vector<KeyframeHandle> out;
+  for (const Covisible& c : map_.keyframes()[keyframe].covisible) {
+    if (out.size() == limit) break;
+    out.push_back(c.keyframe);
+  }
+  return out;
+}
+
+void Mapper::attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request) {
+  for (const Sighting& s : request.sightings) {
+    if (!map_.landmarks().contains(s.landmark)) continue;
+    map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px});
+  }
+  for (const SightingCount& c : request.counts)
+    if (Landmark* l = map_.landmarks().get(c.landmark)) l->visible += c.visible, l->found += c.found;
+}
+
+void Mapper::cull_recent_landmarks() {
+  std::vector<LandmarkHandle> keep;
+  for (const LandmarkHandle& h : recent_) {
+    Landmark* l = map_.landmarks().get(h);
+    if (l == nullptr || l->state == LandmarkState::kBearing) continue;
+    const std::uint64_t age = newest_id_ - std::min(newest_id_, l->created_keyframe);
+    const bool rarely_found = l->found < kMinFoundShare * l->visible;
+    const bool forgotten = age >= 2 && l->observations.size() <= 2;
+    if (rarely_found || forgotten) {
+      map_.remove_landmark(h);
+      ++counts_.landmarks_culled;
+    } else if (age < kProbation_keyframes) {
+      keep.push_back(h);
+    } else {
+      l->state = LandmarkState::kFull;
+    }
+  }
+  recent_.swap(keep);
+}
+
+std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) {
+  SE3 T_world_reference;
+  if (!map_.pose_of(request.reference_id, &T_world_reference)) return nullptr;
+  if (map_.keyframes().full()) limit_memory(newest_);
+  const KeyframeHandle keyframe =
+      make_keyframe(*request.frame, T_world_reference * request.T_reference_body, request.map_id);
+  if (keyframe.is_null()) return nullptr;
+  attach_sightings(keyframe, request);
+  cull_recent_landmarks();
+  map_.update_covisibility(keyframe);
+
+  const std::uint64_t first_new = counts_.landmarks_made;
+  maker_.process(keyframe, neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
+  maker_.evict_bearings(keyframe);
+  if (counts_.landmarks_made > first_new) {
+    const std::uint64_t id = map_.keyframes()[keyframe].id;
+    for (const LandmarkHandle& h : map_.keyframes()[keyframe].landmarks) {
+      const Landmark* l = map_.landmarks().get(h);
+      if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == id) recent_.push_back(h);
+    }
+  }
+  map_.update_covisibility(keyframe);
+  return make_view(keyframe);
+}
+
+std::shared_ptr<const LocalView> Mapper::refine() {
+  if (!map_.keyframes().contains(newest_)) return nullptr;
+  fuse_neighbourhood(newest_);
+  map_.update_covisibility(newest_);
+  optimise(newest_, config_.mapping.iterations);
+  cull_keyframes(newest_);
+  limit_memory(newest_);
+  map_.update_covisibility(newest_);
+  return make_view(newest_);
+}
+
+// ---------------------------------------------------------------------------------------------------- duplicates
+
+void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
+  // The other's measurements are of the other's patch: each is made anew with the patch that stays.
+  const std::vector<Observation> theirs = map_.landmarks()[from].observations;
+  const std::uint32_t found = map_.landmarks()[from].found, visible = map_.landmarks()[from].visible;
+  map_.remove_landmark(from);
+  Landmark& l = map_.landmarks()[into];
+  for (const Observation& o : theirs) {
+    Observation measured;
+    if (Map::find_observation(l, o.keyframe) == nullptr &&
+        measure_observation(config_, map_, l, o.keyframe, static_cast<std::size_t>(o.feature), &measured))
+      map_.add_observation(into, measured);
+  }
+  l.found += found;
+  l.visible += visible;
+  ++counts_.landmarks_fused;
+}
+
+void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks) {
+  Keyframe& keyframe = map_.keyframes()[handle];
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(keyframe.camera)].camera;
+  const SE3 T_camera_world = map_.T_world_camera(keyframe).inverse();
+  const double scale_factor = config_.pyramid.scale_factor;
+  for (const LandmarkHandle& lh : landmarks) {
+    const Landmark* l = map_.landmarks().get(lh);
+    if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr) continue;
+    Prediction p;
+    if (!predict(prediction_input(map_, *l), camera, T_camera_world, 4.0, &p) || p.view_cosine < 0.5) continue;
+    if (p.scale_change < 0.3F || p.scale_change > 3.3F) continue;
+    const int level = predicted_level(l->host_level, p.scale_change, static_cast<float>(scale_factor),
+                                      config_.pyramid.levels);
+    DescriptorQuery q;
+    q.descriptor = l->descriptor;
+    q.u_px = static_cast<float>(p.pixel.x());
+    q.v_px = static_cast<float>(p.pixel.y());
+    q.radius_px = static_cast<float>(3.0 * std::pow(scale_factor, level));
+    q.min_level = level - 1;
+    q.max_level = level + 1;
+    q.max_hamming = config_.tracking.max_hamming * 3 / 4;
+    q.ratio = 1.0F;
+    const int feature = find_descriptor(keyframe.set, keyframe.grid, q, [](std::size_t) { return true; });
+    if (feature < 0) continue;
+    const auto fi = static_cast<std::size_t>(feature);
+    const LandmarkHandle owner = keyframe.landmarks[fi];
+    const Landmark* other = map_.landmarks().get(owner);
+    if (other != nullptr && other->state != LandmarkState::kBearing) {
+      // Two landmarks, one corner: the one with more sightings takes the other in.
+      if (other->observations.size() > l->observations.size())
+        fuse(owner, lh);
+      else
+        fuse(lh, owner);
+      continue;
+    }
+    Observation o;
+    if (!measure_observation(config_, map_, *l, handle, fi, &o)) continue;
+    // A virtual point on the same corner has become superfluous.
+    if (other != nullptr) map_.remove_landmark(owner);
+    map_.add_observation(lh, o);
+  }
+}
+
+void Mapper::fuse_neighbourhood(KeyframeHandle keyframe) {
+  const std::vector<KeyframeHandle> around = neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours));
+  const std::vector<LandmarkHandle> own = map_.keyframes()[keyframe].landmarks;
+  for (const KeyframeHandle& n : around) search_into(n, own);
+  std::vector<LandmarkHandle> theirs;
+  std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
+  for (const KeyframeHandle& n : around)
+    for (const LandmarkHandle& h : map_.keyframes()[n].landmarks)
+      if (map_.landmarks().contains(h) && taken[h.index] == 0) {
+        taken[h.index] = 1;
+        theirs.push_back(h);
+      }
+  search_into(keyframe, theirs);
+}
+
+// ------------------------------------------------------------------------------------------------------ local BA
+
+void Mapper::select_window(KeyframeHandle centre) {
+  window_.assign(1, centre);
+  const auto limit = static_cast<std::size_t>(config_.mapping.window_keyframes);
+  for (const Covisible& c : map_.keyframes()[centre].covisible) {
+    if (window_.size() >= limit) break;
+    window_.push_back(c.keyframe);
+  }
+}
+
+void Mapper::build_problem() {
+  problem_.clear();
+  problem_.rig = &rig_;
+  problem_landmarks_.clear();
+  fixed_.clear();
+  std::fill(pose_index_.begin(), pose_index_.end(), -1);
+  for (const KeyframeHandle& h : window_) {
+    pose_index_[h.index] = static_cast<int>(problem_.poses.size());
+    problem_.poses.push_back({map_.keyframes()[h].T_world_body, false});
+  }
+  // Landmarks of the window, in the order of its keyframes.
+  std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
+  for (const KeyframeHandle& h : window_)
+    for (const LandmarkHandle& lh : map_.keyframes()[h].landmarks) {
+      const Landmark* l = map_.landmarks().get(lh);
+      if (l == nullptr || l->state == LandmarkState::kBearing || taken[lh.index] != 0) continue;
+      if (problem_landmarks_.size() >= static_cast<std::size_t>(config_.mapping.window_landmarks)) break;
+      taken[lh.index] = 1;
+      problem_landmarks_.push_back(lh);
+    }
+  // Historical observers: those that see most, hosts before all (without its host a landmark has no place).
+  std::vector<int> uses(map_.keyframes().capacity(), 0);
+  for (const LandmarkHandle& lh : problem_landmarks_) {
+    const Landmark& l = map_.landmarks()[lh];
+    if (pose_index_[l.host.index] < 0) uses[l.host.index] += 1000;
+    for (const Observation& o : l.observations)
+      if (pose_index_[o.keyframe.index] < 0) ++uses[o.keyframe.index];
+  }
+  std::vector<KeyframeHandle> outside;
+  map_.keyframes().for_each([&](KeyframeHandle h, const Keyframe&) {
+    if (uses[h.index] > 0) outside.push_back(h);
+  });
+  std::stable_sort(outside.begin(), outside.end(),
+                   [&](KeyframeHandle a, KeyframeHandle b) { return uses[a.index] > uses[b.index]; });
+  if (outside.size() > static_cast<std::size_t>(config_.mapping.fixed_keyframes))
+    outside.resize(static_cast<std::size_t>(config_.mapping.fixed_keyframes));
+  for (const KeyframeHandle& h : outside) {
+    pose_index_[h.index] = static_cast<int>(problem_.poses.size());
+    problem_.poses.push_back({map_.keyframes()[h].T_world_body, true});
+    fixed_.push_back(h);
+  }
+  // A young map has no history: its oldest keyframe holds the gauge.
+  if (fixed_.empty()) {
+    std::size_t oldest = 0;
+    for (std::size_t i = 1; i < window_.size(); ++i)
+      if (map_.keyframes()[window_[i]].id < map_.keyframes()[window_[oldest]].id) oldest = i;
+    problem_.poses[oldest].fixed = true;
+  }
+  std::size_t kept = 0;
+  for (const LandmarkHandle& lh : problem_landmarks_) {
+    const Landmark& l = map_.landmarks()[lh];
+    if (pose_index_[l.host.index] < 0) continue;
+    BundleProblem::Point point;
+    point.host = pose_index_[l.host.index];
+    point.T_host_anchor = l.T_host_anchor;
+    point.bearing = l.bearing;
+    point.inverse_depth = l.inverse_depth;
+    point.first_measurement = static_cast<int>(problem_.measurements.size());
+    for (const Observation& o : l.observations) {
+      if (o.sigma_px <= 0.0F || pose_index_[o.keyframe.index] < 0) continue;
+      BundleProblem::Measurement m;
+      m.pose = pose_index_[o.keyframe.index];
+      m.camera = map_.keyframes()[o.keyframe].camera;
+      m.pixel = o.pixel.cast<double>();
+      m.sigma_px = o.sigma_px;
+      problem_.measurements.push_back(m);
+    }
+    point.measurements = static_cast<int>(problem_.measurements.size()) - point.first_measurement;
+    if (point.measurements == 0) continue;
+    problem_.points.push_back(point);
+    problem_landmarks_[kept++] = lh;
+  }
+  problem_landmarks_.resize(kept);
+}
+
+void Mapper::optimise(KeyframeHandle centre, int iterations) {
+  select_window(centre);
+  build_problem();
+  if (problem_.points.empty()) return;
+  BundleOptions options;
+  options.iterations = iterations;
+  const BundleSummary summary = config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_)
+                                                                  : solve_schur(options, &problem_);
+  ++counts_.local_ba;
+  if (summary.usable) take_back();
+}
+
+void Mapper::take_back() {
+  for (std::size_t i = 0; i < window_.size(); ++i) {
+    Keyframe& k = map_.keyframes()[window_[i]];
+    if (problem_.poses[i].fixed) continue;
+    k.T_world_body = problem_.poses[i].T_world_body;
+    ++k.optimised;
+  }
+  std::vector<double> changes;
+  std::vector<KeyframeHandle> outliers;
+  for (std::size_t i = 0; i < problem_.points.size(); ++i) {
+    const BundleProblem::Point& point = problem_.points[i];
+    const LandmarkHandle lh = problem_landmarks_[i];
+    Landmark& l = map_.landmarks()[lh];
+    if (l.inverse_depth > 0.0 && point.inverse_depth > 0.0) changes.push_back(point.inverse_depth / l.inverse_depth);
+    l.inverse_depth = point.inverse_depth;
+    l.inverse_depth_sigma = point.inverse_depth_sigma;
+    outliers.clear();
+    int index = 0;
+    for (const Observation& o : l.observations) {
+      if (o.sigma_px <= 0.0F || pose_index_[o.keyframe.index] < 0) continue;
+      const auto& m = problem_.measurements[static_cast<std::size_t>(point.first_measurement + index++)];
+      if (m.chi2 > kChi2TwoDof) outliers.push_back(o.keyframe);
+    }
+    bool alive = true;
+    for (const KeyframeHandle& k : outliers) alive = alive && map_.remove_observation(lh, k);
+    if (!alive) ++counts_.landmarks_culled;
+  }
+  if (changes.empty()) return;
+  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  update_settling(*middle);
+}
+
+void Mapper::update_settling(double scale_change) {
+  // The unit of a young map follows its first baseline, which is known worst of all. It has settled when three
+  // optimisations in a row moved it by less than two per cent each.
+  constexpr double kSteady = 0.02;
+  constexpr int kSteadyOptimisations = 3;
+  steady_optimisations_ = std::fabs(std::log(scale_change)) < kSteady ? steady_optimisations_ + 1 : 0;
+  if (steady_optimisations_ >= kSteadyOptimisations) settled_ = true;
+}
+
+// ------------------------------------------------------------------------------------------------------- forgetting
+
+void Mapper::cull_keyframes(KeyframeHandle newest) {
+  // Redundant: nine tenths of what it sees, three others see at least as finely.
+  constexpr double kRedundant = 0.9;
+  constexpr int kOthers = 3;
+  constexpr std::uint64_t kKeepNewest = 3;
+  for (const KeyframeHandle& h : neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
+    const Keyframe& k = map_.keyframes()[h];
+    if (k.id + kKeepNewest > newest_id_) continue;
+    int points = 0, redundant = 0;
+    for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
+      const Landmark* l = map_.landmarks().get(k.landmarks[i]);
+      if (l == nullptr || l->state == LandmarkState::kBearing) continue;
+      ++points;
+      int others = 0;
+      for (const Observation& o : l->observations) {
+        if (o.keyframe == h) continue;
+        const Keyframe& other = map_.keyframes()[o.keyframe];
+        if (other.set.features[static_cast<std::size_t>(o.feature)].level <= k.set.features[i].level + 1) ++others;
+        if (others >= kOthers) break;
+      }
+      if (others >= kOthers) ++redundant;
+    }
+    if (points == 0 || redundant <= kRedundant * points) continue;
+    map_.remove_keyframe(h);
+    ++counts_.keyframes_culled;
+  }
+}
+
+void Mapper::limit_memory(KeyframeHandle newest) {
+  // Pixels stay with the newest keyframes only.
+  const auto images = static_cast<std::uint64_t>(config_.capacity.window_images);
+  std::vector<KeyframeHandle> alive;
+  map_.keyframes().for_each([&](KeyframeHandle h, const Keyframe&) { alive.push_back(h); });
+  std::sort(alive.begin(), alive.end(), [this](KeyframeHandle a, KeyframeHandle b) {
+    return map_.keyframes()[a].id > map_.keyframes()[b].id;
+  });
+  for (std::size_t i = images; i < alive.size(); ++i) map_.keyframes()[alive[i]].image.reset();
+  // A full map forgets its oldest keyframe.
+  while (map_.keyframes().full() && !alive.empty()) {
+    if (alive.back() == newest) break;
+    map_.remove_keyframe(alive.back());
+    ++counts_.keyframes_culled;
+    alive.pop_back();
+  }
+  // A full landmark pool: the oldest keyframes' landmarks go with them.
+  while (map_.landmarks().size() > map_.landmarks().capacity() * 9 / 10 && alive.size() > 1) {
+    const KeyframeHandle oldest = alive.back();
+    const std::vector<LandmarkHandle> seen = map_.keyframes()[oldest].landmarks;
+    for (const LandmarkHandle& h : seen) {
+      const Landmark* l = map_.landmarks().get(h);
+      if (l != nullptr && l->last_seen_keyframe + images < newest_id_) map_.remove_landmark(h), ++counts_.landmarks_culled;
+    }
+    map_.remove_keyframe(oldest);
+    ++counts_.keyframes_culled;
+    alive.pop_back();
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------- view
+
+std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
+  auto view = std::make_shared<LocalView>();
+  const Keyframe& centre = map_.keyframes()[reference];
+  view->sequence = ++view_sequence_;
+  view->map_id = centre.map_id;
+  view->reference_id = centre.id;
+  view->T_world_reference = centre.T_world_body;
+  view->settled = settled_;
+  std::vector<KeyframeHandle> members{reference};
+  std::vector<std::uint8_t> member(map_.keyframes().capacity(), 0);
+  member[reference.index] = 1;
+  const auto add = [&](KeyframeHandle h) {
+    if (member[h.index] != 0) return;
+    member[h.index] = 1;
+    members.push_back(h);
+  };
+  for (const KeyframeHandle& h : neighbours(reference, 30)) add(h);
+  // The neighbours' neighbours: what the vehicle saw before a turn comes back into view after it.
+  for (std::size_t i = 1, n = std::min<std::size_t>(members.size(), 10); i < n; ++i)
+    for (const KeyframeHandle& h : neighbours(members[i], 5)) add(h);
+
+  std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
+  std::vector<double> depths;
+  const SE3 T_reference_world = map_.T_world_camera(centre).inverse();
+  for (const KeyframeHandle& h : members) {
+    const Keyframe& k = map_.keyframes()[h];
+    view->keyframes.push_back({k.id, k.T_world_body});
+    for (const LandmarkHandle& lh : k.landmarks) {
+      const Landmark* l = map_.landmarks().get(lh);
+      if (l == nullptr || l->state == LandmarkState::kBearing || taken[lh.index] != 0) continue;
+      taken[lh.index] = 1;
+      ViewLandmark v;
+      v.handle = lh;
+      v.point_w = map_.world_point(*l);
+      const SE3 T_world_anchor = map_.T_world_anchor(*l);
+      v.anchor_w = T_world_anchor.t;
+      v.d_point_d_pixel = T_world_anchor.rotation() * l->d_bearing_d_pixel;
+      v.inverse_depth_sigma = l->inverse_depth_sigma;
+      v.descriptor = l->descriptor;
+      v.patch = l->patch;
+      v.host_level = l->host_level;
+      v.in_reference = h == reference;
+      v.confirmed = l->state == LandmarkState::kFull || l->observations.size() > 2;
+      if (v.in_reference) {
+        if (v.confirmed) ++view->reference_landmarks;
+        const double d = (T_reference_world.q * v.point_w.head<3>() + v.point_w[3] * T_reference_world.t).norm();
+        depths.push_back(d / std::max(v.point_w[3], 1e-9));
+      }
+      view->landmarks.push_back(v);
+    }
+  }
+  std::sort(view->keyframes.begin(), view->keyframes.end(),
+            [](const ViewKeyframe& a, const ViewKeyframe& b) { return a.id < b.id; });
+  map_.keyframes().for_each([&](KeyframeHandle, const Keyframe& k) { view->map_keyframes += k.map_id == centre.map_id; });
+  if (!depths.empty()) {
+    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+    std::nth_element(depths.begin(), middle, depths.end());
+    view->median_depth = *middle;
+  }
+  return view;
+}
+
+}  // namespace farpoint::slam

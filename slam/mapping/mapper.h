@@ -1,0 +1,82 @@
+// Keyframes in, local views out. The only writer of the map.
+//
+// One keyframe is two jobs: insert() ends with the quick view (new landmarks, poses not yet optimised), refine() with
+// the full one (duplicates fused, local BA, culling).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "slam/map/local_view.h"
+#include "slam/map/map.h"
+#include "slam/mapping/bundle_problem.h"
+#include "slam/mapping/landmark_maker.h"
+#include "slam/mapping/statistics.h"
+#include "slam/map/frame.h"
+
+namespace farpoint::slam {
+
+class Mapper {
+ public:
+  Mapper(const EstimatorConfig& config, const Rig& rig);
+
+  // Starts a new map from two views. Null where the structure does not hold (too few points survive BA).
+  std::shared_ptr<const LocalView> start_map(const InitialPair& pair, std::int32_t map_id);
+
+  // Job 1. Null where the keyframe could not be used.
+  std::shared_ptr<const LocalView> insert(const KeyframeRequest& request);
+  // Job 2, on the keyframe inserted last.
+  std::shared_ptr<const LocalView> refine();
+
+  [[nodiscard]] const Map& map() const { return map_; }
+  [[nodiscard]] Map& map() { return map_; }
+  [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  [[nodiscard]] std::uint64_t newest_id() const { return newest_id_; }
+  void discard_map(std::int32_t map_id) { map_.discard_map(map_id); }
+
+ private:
+  KeyframeHandle make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);
+  void attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request);
+  void cull_recent_landmarks();
+  [[nodiscard]] std::vector<KeyframeHandle> neighbours(KeyframeHandle keyframe, std::size_t limit) const;
+
+  // Duplicates: landmarks of the one keyframe searched in the other.
+  void fuse_neighbourhood(KeyframeHandle keyframe);
+  void fuse(LandmarkHandle into, LandmarkHandle from);
+  void search_into(KeyframeHandle keyframe, const std::vector<LandmarkHandle>& landmarks);
+
+  void optimise(KeyframeHandle centre, int iterations);
+  void select_window(KeyframeHandle centre);
+  void build_problem();
+  void take_back();
+  void update_settling(double scale_change);
+
+  void cull_keyframes(KeyframeHandle newest);
+  void limit_memory(KeyframeHandle newest);
+  std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);
+
+  const EstimatorConfig config_;
+  const Rig rig_;
+  Map map_;
+  MappingCounts counts_;
+  LandmarkMaker maker_;
+
+  KeyframeHandle newest_;
+  std::uint64_t newest_id_ = 0;
+  std::uint64_t view_sequence_ = 0;
+  std::vector<LandmarkHandle> recent_;    // made not long ago, on probation
+
+  // Settling: how much the last optimisations still changed the young map's unit.
+  int steady_optimisations_ = 0;
+  bool settled_ = false;
+
+  // Work space of local BA.
+  BundleProblem problem_;
+  std::vector<KeyframeHandle> window_, fixed_;
+  std::vector<LandmarkHandle> problem_landmarks_;
+  std::vector<int> pose_index_;           // one a keyframe slot: index in problem_.poses, or -1
+};
+
+}  // namespace farpoint::slam

@@ -1,0 +1,35 @@
+#include "slam/mapping/measurement.h"
+
+#include <cmath>
+
+namespace farpoint::slam {
+
+namespace {
+// A corner is found to about a pixel of its level; the patch is not looked for further away than twice that.
+constexpr float kSearchLevelPixels = 2.0F;
+}  // namespace
+
+PredictionInput prediction_input(const Map& map, const Landmark& landmark) {
+  const SE3 T_world_anchor = map.T_world_anchor(landmark);
+  return {map.world_point(landmark), T_world_anchor.t, T_world_anchor.rotation() * landmark.d_bearing_d_pixel};
+}
+
+bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark, KeyframeHandle handle,
+                         std::size_t feature, Observation* out) {
+  const Keyframe& keyframe = map.keyframes()[handle];
+  const Camera& camera = map.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
+  const Feature& f = keyframe.set.features[feature];
+  const auto scale = static_cast<float>(std::pow(config.pyramid.scale_factor, f.level));
+  *out = {handle, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, scale};
+  if (!keyframe.image) return false;
+  Prediction p;
+  if (!predict(prediction_input(map, landmark), camera, map.T_world_camera(keyframe).inverse(), 0.0, &p)) return false;
+  const Alignment a =
+      keyframe.image->align(landmark.patch, p.A_target_host, out->pixel, kSearchLevelPixels * scale);
+  if (!a.ok) return false;
+  out->pixel = a.pixel;
+  out->sigma_px = std::hypot(a.sigma_px, static_cast<float>(config.tracking.pixel_sigma_px));
+  return true;
+}
+
+}  // namespace farpoint::slam

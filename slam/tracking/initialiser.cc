@@ -1,0 +1,122 @@
+#include "slam/tracking/initialiser.h"
+
+#include <algorithm>
+
+#include "slam/geometry/two_view.h"
+#include "slam/map/predict.h"
+
+namespace farpoint::slam {
+
+namespace {
+
+// A corner moves less than this share of the image's width from frame to frame; later searches start where the last
+// one found it.
+constexpr float kFirstWindow = 0.08F;
+constexpr int kMinMatches = 80;
+constexpr double kCornerSigma_px = 1.0;    // corners are not aligned yet
+constexpr std::size_t kHistoryFrames = 60;
+
+}  // namespace
+
+Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {}
+
+void Initialiser::clear() {
+  history_.clear();
+  reference_.reset();
+  last_matches_ = 0;
+}
+
+void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
+  reference_ = std::move(frame);
+  expected_px_.clear();
+  for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
+}
+
+void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
+  out->clear();
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)].camera;
+  const float radius_px = kFirstWindow * static_cast<float>(camera.width_px());
+  std::vector<std::int32_t> owner(frame.set.features.size(), -1);
+  std::vector<int> owner_distance(frame.set.features.size(), 257);
+  std::vector<std::int32_t> found(reference_->set.features.size(), -1);
+  for (std::size_t i = 0; i < reference_->set.features.size(); ++i) {
+    const Feature& f = reference_->set.features[i];
+    DescriptorQuery q;
+    q.descriptor = reference_->set.descriptors[i];
+    q.u_px = expected_px_[i].x();
+    q.v_px = expected_px_[i].y();
+    q.radius_px = radius_px;
+    q.min_level = f.level - 1;
+    q.max_level = f.level + 1;
+    q.max_hamming = config_.tracking.max_hamming * 3 / 4;
+    q.ratio = 0.85F;
+    int distance = 0;
+    const int j = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; }, &distance);
+    if (j < 0) continue;
+    const auto ju = static_cast<std::size_t>(j);
+    if (distance >= owner_distance[ju]) continue;
+    if (owner[ju] >= 0) found[static_cast<std::size_t>(owner[ju])] = -1;
+    owner[ju] = static_cast<std::int32_t>(i);
+    owner_distance[ju] = distance;
+    found[i] = j;
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i] < 0) continue;
+    const auto j = static_cast<std::size_t>(found[i]);
+    out->push_back({i, j});
+    expected_px_[i] = {frame.set.features[j].u_px, frame.set.features[j].v_px};
+  }
+}
+
+std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& frame,
+                                              const std::vector<Pairing>& pairs) const {
+  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame->camera)];
+  std::vector<Eigen::Vector3d> first, second;
+  std::vector<Pairing> used;
+  for (const Pairing& p : pairs) {
+    const Feature& a = reference_->set.features[p.feature_first];
+    const Feature& b = frame->set.features[p.feature_second];
+    Eigen::Vector3d ba, bb;
+    if (!camera.camera.unproject({a.u_px, a.v_px}, &ba) || !camera.camera.unproject({b.u_px, b.v_px}, &bb)) continue;
+    first.push_back(ba);
+    second.push_back(bb);
+    used.push_back(p);
+  }
+  const TwoViewResult r = estimate_two_view(first, second, kCornerSigma_px / camera.camera.focal_px());
+  if (r.status != TwoViewStatus::kOk || r.median_parallax_rad < config_.initialisation.min_parallax_rad) return {};
+  InitialPair pair;
+  pair.first = reference_;
+  pair.second = frame;
+  // T_2_1 is between cameras; with an unknown scale the lever arm to the body is zero by definition (config.h).
+  const SE3 T_c1_c2 = r.T_2_1.inverse();
+  pair.T_first_second = camera.T_body_camera * T_c1_c2 * camera.T_body_camera.inverse();
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (r.inlier[i] == 0 || r.inverse_depth[i] <= 0.0) continue;
+    pair.points.push_back({used[i].feature_first, used[i].feature_second, r.inverse_depth[i]});
+  }
+  if (static_cast<int>(pair.points.size()) < config_.initialisation.min_landmarks) return {};
+  return pair;
+}
+
+std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
+  history_.push_back(frame);
+  if (history_.size() > kHistoryFrames) history_.pop_front();
+  if (!reference_) {
+    set_reference(frame);
+    return {};
+  }
+  match(*frame, &pairs_);
+  last_matches_ = static_cast<int>(pairs_.size());
+  const auto age = frame->number - reference_->number;
+  if (last_matches_ < kMinMatches || static_cast<double>(age) > config_.initialisation.max_frames) {
+    // The reference has gone out of sight: a frame half way is the next one, matched anew.
+    const std::uint64_t half = reference_->number + (age + 1) / 2;
+    const auto next = std::find_if(history_.begin(), history_.end(),
+                                   [&](const std::shared_ptr<Frame>& f) { return f->number >= half; });
+    set_reference(next != history_.end() && last_matches_ >= kMinMatches ? *next : frame);
+    return {};
+  }
+  return solve(frame, pairs_);
+}
+
+}  // namespace farpoint::slam

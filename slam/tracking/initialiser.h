@@ -1,0 +1,43 @@
+// Waits for two frames whose matches say how the camera moved and where the points are. Invents nothing: rotation alone,
+// a plane that can be read two ways, or too little parallax mean waiting.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/frame.h"
+
+namespace farpoint::slam {
+
+class Initialiser {
+ public:
+  Initialiser(const EstimatorConfig& config, const Rig& rig);
+
+  // A pair once there is one. The frame joins the history either way.
+  std::optional<InitialPair> add(std::shared_ptr<Frame> frame);
+  void clear();
+  // Frames waited with, oldest first: to be posed once there is a map.
+  [[nodiscard]] const std::deque<std::shared_ptr<Frame>>& history() const { return history_; }
+  [[nodiscard]] int last_matches() const { return last_matches_; }
+
+ private:
+  struct Pairing {
+    std::size_t feature_first = 0, feature_second = 0;
+  };
+  void set_reference(std::shared_ptr<Frame> frame);
+  void match(const Frame& frame, std::vector<Pairing>* out);
+  std::optional<InitialPair> solve(const std::shared_ptr<Frame>& frame, const std::vector<Pairing>& pairs) const;
+
+  const EstimatorConfig config_;
+  const Rig rig_;
+  std::deque<std::shared_ptr<Frame>> history_;
+  std::shared_ptr<Frame> reference_;
+  std::vector<Eigen::Vector2f> expected_px_;    // where each reference feature was seen last
+  std::vector<Pairing> pairs_;
+  int last_matches_ = 0;
+};
+
+}  // namespace farpoint::slam

@@ -1,0 +1,18 @@
+// When a frame is worth remembering.
+#pragma once
+
+#include "slam/config.h"
+#include "slam/map/local_view.h"
+#include "slam/tracking/tracker.h"
+
+namespace farpoint::slam {
+
+struct KeyframeSituation {
+  int frames_since_keyframe = 0;
+  bool mapping_free = false;    // mapping could start on it at once
+};
+
+[[nodiscard]] bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const TrackOutcome& outcome,
+                                  const KeyframeSituation& situation);
+
+}  // namespace farpoint::slam

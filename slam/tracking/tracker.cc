@@ -1,0 +1,344 @@
+#include "slam/tracking/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#if __has_include("slam/geometry/pnp.h")
+#include "slam/geometry/pnp.h"
+#define HAVE_PNP 1
+#endif
+
+namespace farpoint::slam {
+
+namespace {
+
+constexpr double kBorderPx = 4.0;
+constexpr double kMinViewCosine = 0.5;    // 60 degrees from the anchor's view a patch looks different
+// Sizes beyond these cannot be matched: the patch has no pixels left, or too few.
+constexpr float kMinScaleChange = 0.3F, kMaxScaleChange = 3.3F;
+
+bool scale_fits(float change) { return change > kMinScaleChange && change < kMaxScaleChange; }
+
+}  // namespace
+
+Tracker::Tracker(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {
+  counts_.resize(static_cast<std::size_t>(config.capacity.landmarks));
+  counted_slots_.reserve(counts_.size());
+}
+
+void Tracker::set_view(std::shared_ptr<const LocalView> view) {
+  if (view_ && view_->map_id == view->map_id) {
+    // The pose hangs on the newest keyframe both views know: where that went, the pose goes.
+    for (auto old = view_->keyframes.rbegin(); old != view_->keyframes.rend(); ++old) {
+      const auto now = std::find_if(view->keyframes.begin(), view->keyframes.end(),
+                                    [&](const ViewKeyframe& k) { return k.id == old->id; });
+      if (now == view->keyframes.end()) continue;
+      T_world_body_ = now->T_world_body * (old->T_world_body.inverse() * T_world_body_);
+      break;
+    }
+  }
+  view_ = std::move(view);
+  seen_last_frame_.assign(view_->landmarks.size(), 0);
+  std::vector<std::uint32_t> index_of_slot(counts_.size(), 0xFFFFFFFFU);
+  for (std::size_t i = 0; i < view_->landmarks.size(); ++i)
+    index_of_slot[view_->landmarks[i].handle.index] = static_cast<std::uint32_t>(i);
+  for (const LandmarkHandle& h : last_seen_) {
+    const std::uint32_t i = index_of_slot[h.index];
+    if (i != 0xFFFFFFFFU && view_->landmarks[i].handle == h) seen_last_frame_[i] = 1;
+  }
+}
+
+void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
+  T_world_body_ = T_world_body;
+  utime_ = utime;
+  velocity_.setZero();
+  has_velocity_ = false;
+  last_seen_.clear();
+  view_.reset();
+  for (const std::uint32_t slot : counted_slots_) counts_[slot] = {};
+  counted_slots_.clear();
+}
+
+SE3 Tracker::predict_pose(std::int64_t utime) const {
+  if (!has_velocity_) return T_world_body_;
+  const double dt_s = static_cast<double>(utime - utime_) * 1e-6;
+  // Beyond a second the last motion says nothing any more.
+  if (dt_s <= 0.0 || dt_s > 1.0) return T_world_body_;
+  return T_world_body_.boxplus(velocity_ * dt_s);
+}
+
+void Tracker::project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const {
+  out->clear();
+  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  const SE3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
+  for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
+    const ViewLandmark& l = view_->landmarks[i];
+    Candidate c;
+    if (!predict({l.point_w, l.anchor_w, l.d_point_d_pixel}, camera.camera, T_camera_world, kBorderPx, &c.prediction))
+      continue;
+    if (c.prediction.view_cosine < kMinViewCosine || !scale_fits(c.prediction.scale_change)) continue;
+    c.view_index = static_cast<std::uint32_t>(i);
+    c.level = predicted_level(l.host_level, c.prediction.scale_change,
+                              static_cast<float>(config_.pyramid.scale_factor), config_.pyramid.levels);
+    out->push_back(c);
+  }
+}
+
+int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px,
+                              float ratio, bool last_frame_only) {
+  const double scale_factor = config_.pyramid.scale_factor;
+  int found = 0;
+  std::vector<std::uint8_t> matched(view_->landmarks.size(), 0);
+  for (const Match& m : matches_) matched[m.view_index] = 1;
+  for (const Candidate& c : candidates) {
+    const ViewLandmark& l = view_->landmarks[c.view_index];
+    if (matched[c.view_index] != 0) continue;
+    if (last_frame_only && seen_last_frame_[c.view_index] == 0) continue;
+    // What the depth leaves open widens the window.
+    const double depth_px = std::min(20.0, 2.0 * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
+    DescriptorQuery q;
+    q.descriptor = l.descriptor;
+    q.u_px = static_cast<float>(c.prediction.pixel.x());
+    q.v_px = static_cast<float>(c.prediction.pixel.y());
+    q.radius_px = static_cast<float>(radius_px * std::pow(scale_factor, c.level) + depth_px);
+    q.min_level = c.level - 1;
+    q.max_level = c.level + 1;
+    q.max_hamming = config_.tracking.max_hamming;
+    q.ratio = ratio;
+    const int feature = find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return feature_match_[f] < 0; });
+    if (feature < 0) continue;
+    const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
+    Match m;
+    m.view_index = c.view_index;
+    m.feature = feature;
+    m.pixel = {f.u_px, f.v_px};
+    m.sigma_px = static_cast<float>(std::pow(scale_factor, f.level));
+    m.inlier = true;
+    feature_match_[static_cast<std::size_t>(feature)] = static_cast<std::int32_t>(matches_.size());
+    matches_.push_back(m);
+    ++found;
+  }
+  return found;
+}
+
+void Tracker::align_matches(const Frame& frame, const std::vector<Candidate>& candidates) {
+  if (!frame.image) return;
+  const double scale_factor = config_.pyramid.scale_factor;
+  std::vector<const Candidate*> of_view(view_->landmarks.size(), nullptr);
+  for (const Candidate& c : candidates) of_view[c.view_index] = &c;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    Match m = matches_[i];
+    const Candidate* c = of_view[m.view_index];
+    if (c == nullptr) continue;
+    const Feature& f = frame.set.features[static_cast<std::size_t>(m.feature)];
+    const auto level_scale = static_cast<float>(std::pow(scale_factor, f.level));
+    const Alignment a = frame.image->align(view_->landmarks[m.view_index].patch, c->prediction.A_target_host,
+                                           {f.u_px, f.v_px}, 2.0F * level_scale);
+    if (a.ok) {
+      m.pixel = a.pixel;
+      m.sigma_px = std::hypot(a.sigma_px, static_cast<float>(config_.tracking.pixel_sigma_px));
+      m.aligned = true;
+      matches_[kept++] = m;
+    } else {
+      feature_match_[static_cast<std::size_t>(m.feature)] = -1;
+    }
+  }
+  matches_.resize(kept);
+}
+
+PoseSolution Tracker::pose_from_matches(const Frame& frame, const SE3& start) {
+  measurements_.clear();
+  for (const Match& m : matches_) {
+    const ViewLandmark& l = view_->landmarks[m.view_index];
+    PoseMeasurement pm;
+    pm.point_w = l.point_w;
+    pm.anchor_w = l.anchor_w;
+    pm.inverse_depth_sigma = l.inverse_depth_sigma;
+    pm.pixel = m.pixel.cast<double>();
+    pm.sigma_px = m.sigma_px;
+    pm.camera = frame.camera;
+    measurements_.push_back(pm);
+  }
+  PoseSolution s = solve_pose(rig_, start, measurements_);
+  for (std::size_t i = 0; i < matches_.size(); ++i) matches_[i].inlier = measurements_[i].inlier;
+  return s;
+}
+
+// First pose: the landmarks of the last frame near where the prior expects them, then further away, then the whole view.
+bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
+  project_view(frame, *T_world_body, &candidates_);
+  const double base = config_.tracking.prior_search_px;
+  struct Attempt {
+    double radius_px;
+    bool last_frame_only;
+  };
+  const Attempt attempts[] = {{base, true}, {2.0 * base, true}, {2.0 * base, false}, {4.0 * base, false}};
+  for (const Attempt& a : attempts) {
+    matches_.clear();
+    std::fill(feature_match_.begin(), feature_match_.end(), -1);
+    if (match_candidates(frame, candidates_, a.radius_px, 0.9F, a.last_frame_only) < config_.tracking.min_matches)
+      continue;
+    const PoseSolution s = pose_from_matches(frame, *T_world_body);
+    // Half of what was matched must agree: a pose that explains a fifth of the matches explains nothing.
+    if (s.inliers >= config_.tracking.min_matches / 2 && 2 * s.inliers >= static_cast<int>(matches_.size()) && s.ok) {
+      *T_world_body = s.T_world_body;
+      return true;
+    }
+  }
+  return false;
+}
+
+TrackOutcome Tracker::fine_pose(const Frame& frame, const SE3& start) {
+  TrackOutcome out;
+  out.T_world_body = start;
+  // Matches that the first pose rejected free their features.
+  std::size_t kept = 0;
+  for (const Match& m : matches_) {
+    if (m.inlier)
+      matches_[kept++] = m;
+    else
+      feature_match_[static_cast<std::size_t>(m.feature)] = -1;
+  }
+  matches_.resize(kept);
+  for (std::size_t i = 0; i < kept; ++i)
+    feature_match_[static_cast<std::size_t>(matches_[i].feature)] = static_cast<std::int32_t>(i);
+
+  project_view(frame, start, &candidates_);
+  out.expected = static_cast<int>(candidates_.size());
+  match_candidates(frame, candidates_, config_.tracking.local_search_px, 0.8F, false);
+  align_matches(frame, candidates_);
+  out.matches = static_cast<int>(matches_.size());
+  if (out.matches < config_.tracking.min_matches / 2) return out;
+  const PoseSolution s = pose_from_matches(frame, start);
+  out.T_world_body = s.T_world_body;
+  out.covariance = s.covariance;
+  out.inliers = s.inliers;
+  out.rms = s.rms;
+  for (const Match& m : matches_) {
+    if (!m.inlier) continue;
+    if (m.aligned) ++out.aligned;
+    if (view_->landmarks[m.view_index].in_reference && view_->landmarks[m.view_index].confirmed)
+      ++out.reference_inliers;
+  }
+  out.ok = s.ok && s.inliers >= config_.tracking.min_inliers / 2;
+  if (out.ok) out.median_motion_px = motion_since_reference(frame, s.T_world_body);
+  return out;
+}
+
+double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_body) const {
+  // Parallax in pixels: where landmarks are now against where rotation alone would have put them.
+  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  const SE3 T_c_w = (T_world_body * camera.T_body_camera).inverse();
+  const Eigen::Vector3d centre = (T_world_body * camera.T_body_camera).t;
+  const Eigen::Vector3d reference = (view_->T_world_reference * camera.T_body_camera).t;
+  std::vector<double> motions;
+  motions.reserve(matches_.size());
+  for (const Match& m : matches_) {
+    if (!m.inlier) continue;
+    const Eigen::Vector4d& p = view_->landmarks[m.view_index].point_w;
+    const Eigen::Vector3d now = p.head<3>() - p[3] * centre, then = p.head<3>() - p[3] * reference;
+    motions.push_back(std::atan2(now.cross(then).norm(), now.dot(then)) * camera.camera.focal_px());
+  }
+  (void)T_c_w;
+  if (motions.empty()) return 0.0;
+  std::nth_element(motions.begin(), motions.begin() + static_cast<std::ptrdiff_t>(motions.size() / 2), motions.end());
+  return motions[motions.size() / 2];
+}
+
+TrackOutcome Tracker::track(const Frame& frame) { return track_from(frame, predict_pose(frame.utime)); }
+
+TrackOutcome Tracker::track_from(const Frame& frame, const SE3& prior) {
+  feature_match_.assign(frame.set.features.size(), -1);
+  matches_.clear();
+  if (!view_) return {};
+  SE3 T = prior;
+  if (!coarse_pose(frame, &T)) return {};
+  return fine_pose(frame, T);
+}
+
+TrackOutcome Tracker::relocalise(const Frame& frame) {
+  feature_match_.assign(frame.set.features.size(), -1);
+  matches_.clear();
+  if (!view_) return {};
+  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  std::vector<Eigen::Vector3d> bearings, points;
+  DescriptorQuery q;
+  q.u_px = static_cast<float>(camera.camera.width_px()) / 2;
+  q.v_px = static_cast<float>(camera.camera.height_px()) / 2;
+  q.radius_px = 1e6F;
+  q.max_hamming = config_.tracking.max_hamming * 3 / 4;
+  q.ratio = 0.75F;
+  q.max_level = config_.pyramid.levels - 1;
+  for (const ViewLandmark& l : view_->landmarks) {
+    if (!l.confirmed || l.point_w[3] <= 0.0) continue;
+    q.descriptor = l.descriptor;
+    const int f = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; });
+    if (f < 0) continue;
+    const Feature& feature = frame.set.features[static_cast<std::size_t>(f)];
+    Eigen::Vector3d bearing;
+    if (!camera.camera.unproject({feature.u_px, feature.v_px}, &bearing)) continue;
+    bearings.push_back(bearing);
+    points.push_back(l.point_w.head<3>() / l.point_w[3]);
+  }
+#ifdef HAVE_PNP
+  const PnpResult pnp = solve_pnp(bearings, points, 2.0 / camera.camera.focal_px(), PnpOptions{});
+  if (!pnp.ok) return {};
+  const SE3 T_world_body = (camera.T_body_camera * pnp.T_camera_world).inverse();
+  return track_from(frame, T_world_body);
+#else
+  return {};
+#endif
+}
+
+void Tracker::accept(const Frame& frame, const TrackOutcome& outcome, bool continuous) {
+  const double dt_s = static_cast<double>(frame.utime - utime_) * 1e-6;
+  if (continuous && dt_s > 0.0 && dt_s < 1.0) {
+    velocity_ = T_world_body_.boxminus_to(outcome.T_world_body) / dt_s;
+    has_velocity_ = true;
+  } else {
+    velocity_.setZero();
+    has_velocity_ = false;
+  }
+  T_world_body_ = outcome.T_world_body;
+  utime_ = frame.utime;
+  count_sightings();
+}
+
+void Tracker::count_sightings() {
+  last_seen_.clear();
+  std::fill(seen_last_frame_.begin(), seen_last_frame_.end(), std::uint8_t{0});
+  const auto slot_of = [this](LandmarkHandle h) -> SightingCount& {
+    SightingCount& c = counts_[h.index];
+    if (c.landmark != h) {
+      if (c.landmark.is_null()) counted_slots_.push_back(h.index);
+      c = {h, 0, 0};
+    }
+    return c;
+  };
+  for (const Candidate& c : candidates_) ++slot_of(view_->landmarks[c.view_index].handle).visible;
+  for (const Match& m : matches_) {
+    if (!m.inlier) continue;
+    const LandmarkHandle h = view_->landmarks[m.view_index].handle;
+    ++slot_of(h).found;
+    last_seen_.push_back(h);
+    seen_last_frame_[m.view_index] = 1;
+  }
+}
+
+void Tracker::sightings(std::vector<Sighting>* out) const {
+  out->clear();
+  for (const Match& m : matches_)
+    if (m.inlier) out->push_back({view_->landmarks[m.view_index].handle, m.feature, m.pixel, m.sigma_px});
+}
+
+void Tracker::take_counts(std::vector<SightingCount>* out) {
+  out->clear();
+  for (const std::uint32_t slot : counted_slots_) {
+    out->push_back(counts_[slot]);
+    counts_[slot] = {};
+  }
+  counted_slots_.clear();
+}
+
+}  // namespace farpoint::slam

@@ -1,0 +1,105 @@
+// Frame -> pose against an immutable local view. Touches no map, waits for nobody.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/local_view.h"
+#include "slam/map/predict.h"
+#include "slam/map/frame.h"
+#include "slam/tracking/pose_solver.h"
+
+namespace farpoint::slam {
+
+// A view landmark matched to a feature of the present frame.
+struct Match {
+  std::uint32_t view_index = 0;
+  std::int32_t feature = -1;
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  float sigma_px = 1.0F;
+  bool aligned = false;
+  bool inlier = false;
+};
+
+struct TrackOutcome {
+  bool ok = false;                // a pose that may be used
+  SE3 T_world_body;
+  Matrix6d covariance = Matrix6d::Zero();
+  int matches = 0;                // after the local search
+  int inliers = 0, aligned = 0;   // of the final pose
+  int reference_inliers = 0;      // inliers among the reference keyframe's landmarks
+  int expected = 0;               // landmarks that project into the image
+  double median_motion_px = 0;    // of inliers against the reference keyframe, rotation taken out
+  double rms = 0;
+};
+
+class Tracker {
+ public:
+  Tracker(const EstimatorConfig& config, const Rig& rig);
+
+  // Takes a newer view. Pose and motion prior move with the reference keyframe's correction.
+  void set_view(std::shared_ptr<const LocalView> view);
+  [[nodiscard]] const LocalView* view() const { return view_.get(); }
+
+  // Forgets pose, prior and matches: a new map begins at this pose.
+  void start(const SE3& T_world_body, std::int64_t utime);
+
+  // Pose of the frame by the constant-velocity prior, the last frame's landmarks, then the local map.
+  TrackOutcome track(const Frame& frame);
+  // The same from a given prior, leaving the tracker's own state alone: for frames posed afterwards.
+  TrackOutcome track_from(const Frame& frame, const SE3& prior);
+  // Searches the whole view without a prior: descriptors, PnP, then the local map.
+  TrackOutcome relocalise(const Frame& frame);
+
+  // Accepts the outcome of track()/relocalise() as this frame's pose.
+  void accept(const Frame& frame, const TrackOutcome& outcome, bool continuous);
+
+  // Inlier sightings of the last search, and the counts since take_counts() was last called.
+  void sightings(std::vector<Sighting>* out) const;
+  void take_counts(std::vector<SightingCount>* out);
+
+  [[nodiscard]] const SE3& T_world_body() const { return T_world_body_; }
+  [[nodiscard]] const std::vector<Match>& matches() const { return matches_; }
+  // Relative motion of the last accepted frames per second, body axes (translation, rotation).
+  [[nodiscard]] Vector6d velocity_body() const { return velocity_; }
+
+ private:
+  struct Candidate {
+    std::uint32_t view_index = 0;
+    Prediction prediction;
+    int level = 0;
+  };
+
+  [[nodiscard]] SE3 predict_pose(std::int64_t utime) const;
+  void project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const;
+  bool coarse_pose(const Frame& frame, SE3* T_world_body);
+  int match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px, float ratio,
+                       bool last_frame_only);
+  void align_matches(const Frame& frame, const std::vector<Candidate>& candidates);
+  PoseSolution pose_from_matches(const Frame& frame, const SE3& start);
+  TrackOutcome fine_pose(const Frame& frame, const SE3& start);
+  void count_sightings();
+  [[nodiscard]] double motion_since_reference(const Frame& frame, const SE3& T_world_body) const;
+
+  const EstimatorConfig config_;
+  const Rig rig_;
+  std::shared_ptr<const LocalView> view_;
+
+  SE3 T_world_body_;
+  std::int64_t utime_ = 0;
+  Vector6d velocity_ = Vector6d::Zero();
+  bool has_velocity_ = false;
+
+  // Work space, reused.
+  std::vector<Candidate> candidates_;
+  std::vector<Match> matches_;
+  std::vector<std::int32_t> feature_match_;        // one a feature: index in matches_, or -1
+  std::vector<PoseMeasurement> measurements_;
+  std::vector<LandmarkHandle> last_seen_;          // inliers of the last accepted frame
+  std::vector<std::uint8_t> seen_last_frame_;      // one a view landmark
+  std::vector<SightingCount> counts_;              // one a landmark slot of the map
+  std::vector<std::uint32_t> counted_slots_;
+};
+
+}  // namespace farpoint::slam
