@@ -155,6 +155,7 @@ bool LogReader::next(LogEvent* event) {
     }
     skip_to_sync();
   }
+  damage_.cut_off = damage_.places > 0 && damage_end_ == offset_;
   return false;
 }
 

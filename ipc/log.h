@@ -33,6 +33,7 @@ struct LogDamage {
   std::uint64_t places = 0;        // connected stretches that were skipped, a cut-off end included
   std::uint64_t bytes = 0;         // skipped in all
   std::uint64_t first_offset = 0;  // of the first place
+  bool cut_off = false;            // known at the end: the last place reaches it
   std::string read_error;          // errno's text where the disk or pipe itself failed, else empty
 };
 

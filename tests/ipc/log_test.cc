@@ -131,6 +131,7 @@ TEST(Log, CutOffAnywhereGivesTheWholeEventsBefore) {
     EXPECT_TRUE(std::equal(events.begin(), events.end(), written.begin()));
     const bool at_boundary = size == 0 || std::find(ends.begin(), ends.end(), size) != ends.end();
     EXPECT_EQ(damage.places, at_boundary ? 0U : 1U) << "cut at " << size;
+    EXPECT_EQ(damage.cut_off, !at_boundary) << "cut at " << size;
     EXPECT_EQ(damage.bytes, at_boundary ? 0U : size - (whole == 0 ? 0 : ends[whole - 1]));
   }
 }

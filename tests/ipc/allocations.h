@@ -1,0 +1,13 @@
+// Counts this program's heap calls, those of C libraries included.
+#pragma once
+
+#include <cstdint>
+
+namespace farpoint::test {
+
+// False where a sanitizer owns the heap: then allocations() stays 0.
+[[nodiscard]] bool counts_allocations();
+// malloc, calloc, realloc and aligned allocation so far.
+[[nodiscard]] std::uint64_t allocations();
+
+}  // namespace farpoint::test
