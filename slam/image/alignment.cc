@@ -1,9 +1,11 @@
 // PyramidImage: patches and their alignment (inverse compositional Lucas-Kanade; Baker & Matthews, IJCV
 // 2004).
 //
-// Both the host patch and the image are read through the same quadratic B-spline smoothing. Linear
-// interpolation blurs by an amount that depends on the sub-pixel position, which pulls the minimum towards
-// whole pixels; this spline shifts nothing and blurs by a variance of 1/4 px^2 at every position.
+// Both the host patch and the image are read through the same smoothing: [1 2 1]/4 and a quadratic B-spline.
+// Two errors that pull a measurement towards whole pixels are met that way. Linear interpolation blurs by an
+// amount that depends on the sub-pixel position; the B-spline blurs by a variance of 1/4 px^2 at every
+// position and shifts nothing. And camera images alias: their finest detail moves with the pixel grid, not
+// with the scene; the small blur takes it out of the comparison.
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -24,14 +26,22 @@ constexpr float kMaxStep = 1.0F;     // level pixels an iteration: the linearisa
 constexpr float kMaxScale = 2.2F;
 // From here on one sample a template pixel would miss pixels of the patch: four are averaged.
 constexpr float kSupersampleScale = 1.3F;
-// What is the same surface correlates better than this; chance and occlusion mostly do not.
-constexpr float kMinZncc = 0.7F;
-// Grey levels, 1 sigma, of noise the residual cannot show: quantisation, and what 64 pixels may have hidden.
-constexpr float kMinNoise = 1.0F;
-// Measured (tests/image/alignment_test.cc): error that texture and noise do not explain, level pixels.
+// Of the matches of recorded frames that correlate less than this, most lie nowhere near their epipolar line.
+constexpr float kMinZncc = 0.8F;
+// Grey levels, 1 sigma, after the smoothing, that a residual of 64 pixels may hide.
+constexpr float kMinNoise = 0.7F;
+// Variance of the position against what independent pixels would give. The smoothing correlates the noise of
+// neighbours (about 9), and what differs between two views of a surface is as coarse as its texture.
+// Measured: epipolar distances in recorded frames (KITTI, EuRoC) against this claim, see
+// tests/image/alignment_test.cc.
+constexpr float kNoiseCorrelation = 14.0F;
+// What remains where texture and noise explain nothing, level pixels; measured likewise.
 constexpr float kSigmaFloor = 0.05F;
-// The error of the worst direction, level pixels, above which the position along it is not known.
-constexpr float kMaxSigma = 0.5F;
+// The error of the worst direction, level pixels, above which the position along it is not known: there a
+// descriptor match alone is as good.
+constexpr float kMaxSigma = 0.75F;
+// [1 2 1] / 4 next to the centre and at the centre.
+constexpr float kBlurSide = 0.25F, kBlurCentre = 0.5F;
 
 struct SplineWeights {
   float value[3], slope[3];
@@ -48,21 +58,44 @@ int nearest_pixel(float x) {
 }
 
 using Window = std::array<float, kCount>;
+using SmoothPatch = std::array<float, Patch::kSize * Patch::kSize>;
 
 // The warped host patch: values and derivatives by the target level's pixel.
 struct Template {
   Window value, dx, dy;
 };
 
+// The patch after [1 2 1]/4 along both axes; pixels outside count as their neighbour inside.
+void smooth_patch(const Patch& patch, SmoothPatch* out) {
+  constexpr int kSize = Patch::kSize;
+  float rows[kSize + 2][kSize];
+  for (int y = 0; y < kSize; ++y) {
+    const std::uint8_t* p = patch.pixels.data() + y * kSize;
+    const auto smooth = [p](int left, int x, int right) {
+      return kBlurSide * static_cast<float>(p[left] + p[right]) + kBlurCentre * static_cast<float>(p[x]);
+    };
+    rows[y + 1][0] = smooth(0, 0, 1);
+    for (int x = 1; x < kSize - 1; ++x) rows[y + 1][x] = smooth(x - 1, x, x + 1);
+    rows[y + 1][kSize - 1] = smooth(kSize - 2, kSize - 1, kSize - 1);
+  }
+  std::copy_n(rows[1], kSize, rows[0]);
+  std::copy_n(rows[kSize], kSize, rows[kSize + 1]);
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      (*out)[static_cast<std::size_t>(y * kSize + x)] =
+          kBlurSide * (rows[y][x] + rows[y + 2][x]) + kBlurCentre * rows[y + 1][x];
+    }
+  }
+}
+
 // Adds value and gradient of the patch at host pixel (x, y), which the caller has checked.
-void sample_patch(const Patch& patch, float x, float y, float* value, Eigen::Vector2f* gradient) {
+void sample_patch(const SmoothPatch& patch, float x, float y, float* value, Eigen::Vector2f* gradient) {
   const int ix = nearest_pixel(x), iy = nearest_pixel(y);
   const SplineWeights wx = spline(x - static_cast<float>(ix)), wy = spline(y - static_cast<float>(iy));
-  const std::uint8_t* row = patch.pixels.data() + (iy - 1) * Patch::kSize + ix - 1;
+  const float* row = patch.data() + (iy - 1) * Patch::kSize + ix - 1;
   for (int k = 0; k < 3; ++k, row += Patch::kSize) {
-    const float p0 = row[0], p1 = row[1], p2 = row[2];
-    const float along = wx.value[0] * p0 + wx.value[1] * p1 + wx.value[2] * p2;
-    const float slope = wx.slope[0] * p0 + wx.slope[1] * p1 + wx.slope[2] * p2;
+    const float along = wx.value[0] * row[0] + wx.value[1] * row[1] + wx.value[2] * row[2];
+    const float slope = wx.slope[0] * row[0] + wx.slope[1] * row[1] + wx.slope[2] * row[2];
     *value += wy.value[k] * along;
     gradient->x() += wy.value[k] * slope;
     gradient->y() += wy.slope[k] * along;
@@ -72,23 +105,25 @@ void sample_patch(const Patch& patch, float x, float y, float* value, Eigen::Vec
 // `B` maps an offset in target level pixels to one in host level pixels. False if the template leaves the
 // patch.
 bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
-  const float largest = B.norm();  // at least the largest singular value
-  const bool fine = largest > kSupersampleScale * std::sqrt(2.0F);
+  // The norm of an isotropic warp is sqrt(2) times its scale.
+  const bool fine = B.norm() > kSupersampleScale * std::sqrt(2.0F);
   const float sub = fine ? 0.25F : 0.0F;
   const float reach = -kFirst + sub;
   // The spline reads one pixel around the nearest: positions 0.5 .. 14.5 are inside, the corner is at 8.
   constexpr float kReach = Patch::kSize - 1.5F - Patch::kCentre;
-  if ((B.cwiseAbs() * Eigen::Vector2f(reach, reach)).maxCoeff() >= kReach) return false;
-  const int samples = fine ? 2 : 1;
-  const float share = 1.0F / static_cast<float>(samples * samples);
+  if (!((B.cwiseAbs() * Eigen::Vector2f(reach, reach)).maxCoeff() < kReach)) return false;
+  SmoothPatch smooth;
+  smooth_patch(patch, &smooth);
+  const int samples = fine ? 4 : 1;
+  const float share = 1.0F / static_cast<float>(samples);
   for (int i = 0; i < kCount; ++i) {
     const Eigen::Vector2f d(kFirst + static_cast<float>(i % kSide), kFirst + static_cast<float>(i / kSide));
     float value = 0;
     Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
-    for (int s = 0; s < samples * samples; ++s) {
+    for (int s = 0; s < samples; ++s) {
       const Eigen::Vector2f shift((s & 1) != 0 ? sub : -sub, (s & 2) != 0 ? sub : -sub);
       const Eigen::Vector2f p = B * (d + shift) + Eigen::Vector2f::Constant(Patch::kCentre);
-      sample_patch(patch, p.x(), p.y(), &value, &gradient);
+      sample_patch(smooth, p.x(), p.y(), &value, &gradient);
     }
     const Eigen::Vector2f by_target = B.transpose() * gradient * share;
     const auto index = static_cast<std::size_t>(i);
@@ -99,29 +134,44 @@ bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
   return true;
 }
 
+// Spline and blur in one: weights of the pixels nearest - 2 .. nearest + 2.
+void smooth_weights(float t, float out[5]) {
+  const SplineWeights w = spline(t);
+  for (int k = 0; k < 5; ++k) {
+    const auto at = [&w](int i) { return i >= 0 && i < 3 ? w.value[i] : 0.0F; };
+    out[k] = kBlurSide * (at(k - 2) + at(k)) + kBlurCentre * at(k - 1);
+  }
+}
+
 // The image around (x, y), at the offsets of the template. False if it leaves the image.
 bool sample_window(const ImageView& image, float x, float y, Window* out) {
+  constexpr int kRows = kSide + 4;
   const float x0 = x + kFirst, y0 = y + kFirst;
   // Written so that NaN fails.
-  if (!(x0 >= 0.5F && y0 >= 0.5F && x0 + kSide < static_cast<float>(image.width_px) - 0.5F &&
-        y0 + kSide < static_cast<float>(image.height_px) - 0.5F)) {
+  if (!(x0 >= 1.5F && y0 >= 1.5F && x0 + kSide < static_cast<float>(image.width_px) - 1.5F &&
+        y0 + kSide < static_cast<float>(image.height_px) - 1.5F)) {
     return false;
   }
   const int ix = nearest_pixel(x0), iy = nearest_pixel(y0);
-  const SplineWeights wx = spline(x0 - static_cast<float>(ix)), wy = spline(y0 - static_cast<float>(iy));
-  float rows[kSide + 2][kSide];
-  for (int r = 0; r < kSide + 2; ++r) {
+  float wx[5], wy[5];
+  smooth_weights(x0 - static_cast<float>(ix), wx);
+  smooth_weights(y0 - static_cast<float>(iy), wy);
+  float rows[kRows][kSide];
+  for (int r = 0; r < kRows; ++r) {
     const std::uint8_t* p =
-        image.data + static_cast<std::ptrdiff_t>(iy - 1 + r) * image.stride_bytes + ix - 1;
+        image.data + static_cast<std::ptrdiff_t>(iy - 2 + r) * image.stride_bytes + ix - 2;
+    float pixels[kRows];
+    for (int c = 0; c < kRows; ++c) pixels[c] = static_cast<float>(p[c]);
     for (int c = 0; c < kSide; ++c) {
-      rows[r][c] = wx.value[0] * static_cast<float>(p[c]) + wx.value[1] * static_cast<float>(p[c + 1]) +
-                   wx.value[2] * static_cast<float>(p[c + 2]);
+      rows[r][c] = wx[0] * pixels[c] + wx[1] * pixels[c + 1] + wx[2] * pixels[c + 2] + wx[3] * pixels[c + 3] +
+                   wx[4] * pixels[c + 4];
     }
   }
   for (int r = 0; r < kSide; ++r) {
     for (int c = 0; c < kSide; ++c) {
-      (*out)[static_cast<std::size_t>(r * kSide + c)] =
-          wy.value[0] * rows[r][c] + wy.value[1] * rows[r + 1][c] + wy.value[2] * rows[r + 2][c];
+      (*out)[static_cast<std::size_t>(r * kSide + c)] = wy[0] * rows[r][c] + wy[1] * rows[r + 1][c] +
+                                                        wy[2] * rows[r + 2][c] + wy[3] * rows[r + 3][c] +
+                                                        wy[4] * rows[r + 4][c];
     }
   }
   return true;
@@ -249,7 +299,8 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
     variance = (energy - along * along) / (kCount - 4);
   }
   const float noise = std::max(variance, kMinNoise * kMinNoise);
-  const Eigen::Matrix2f covariance = host_template.inverse_hessian * (noise / (gain * gain));
+  const Eigen::Matrix2f covariance =
+      host_template.inverse_hessian * (kNoiseCorrelation * noise / (gain * gain));
   const float sigma = std::sqrt(0.5F * covariance.trace() + kSigmaFloor * kSigmaFloor);
   result.pixel = (p + half) * scale - half;
   result.sigma_px = sigma * scale;
