@@ -6,15 +6,17 @@ namespace farpoint::daemon {
 namespace {
 
 // Standard deviation; NaN, which the codec sends as 'not available', where the variance is none.
-double sigma(double variance) { return std::sqrt(variance); }
+double sigma(double variance) {
+  return std::sqrt(variance);
+}
 
 // d(roll, pitch, heading) / d(rotation about the body's axes) for R = Rz(heading) Ry(pitch) Rx(roll).
 Eigen::Matrix3d euler_jacobian(const ipc::EulerAngles& angles) {
   const double sin_roll = std::sin(angles.roll_rad), cos_roll = std::cos(angles.roll_rad);
   const double tan_pitch = std::tan(angles.pitch_rad), cos_pitch = std::cos(angles.pitch_rad);
   Eigen::Matrix3d J;
-  J << 1.0, sin_roll * tan_pitch, cos_roll * tan_pitch,    //
-      0.0, cos_roll, -sin_roll,                            //
+  J << 1.0, sin_roll * tan_pitch, cos_roll * tan_pitch,  //
+      0.0, cos_roll, -sin_roll,                          //
       0.0, sin_roll / cos_pitch, cos_roll / cos_pitch;
   return J;
 }

@@ -11,8 +11,8 @@
 
 namespace farpoint::daemon {
 
-// What one frame says on the bus. Standard deviations of the position are along the axes of the frame that the pose is
-// in; those of the attitude are of heading, roll and pitch. age_s: from mid-exposure to sending.
+// What one frame says on the bus. Standard deviations of the position are along the axes of the frame that
+// the pose is in; those of the attitude are of heading, roll and pitch. age_s: from mid-exposure to sending.
 [[nodiscard]] ipc::OdometryEpoch make_epoch(const FrameOutput& frame, CanPoseFrame pose_frame, double age_s);
 
 class CanSink final : public PoseSink {

@@ -1,5 +1,6 @@
 #include "daemon/config.h"
 
+#include <spdlog/fmt/fmt.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -82,7 +83,7 @@ std::string suggestion(const std::string& name) {
 
 // What a user wrote, shortened.
 std::string quote(const std::string& text) {
-  return "'" + text.substr(0, 60) + (text.size() > 60 ? "..." : "") + "'";
+  return fmt::format("'{}{}'", text.substr(0, 60), text.size() > 60 ? "..." : "");
 }
 
 // Text as a YAML scalar in double quotes.

@@ -1,3 +1,5 @@
-int main() {
-  return 0;
+#include "daemon/run.h"
+
+int main(int argc, char** argv) {
+  return farpoint::daemon::run(argc, argv);
 }

@@ -13,7 +13,8 @@
 namespace farpoint::daemon {
 
 void start_logging(const std::string& level) {
-  auto logger = std::make_shared<spdlog::logger>("farpointd", std::make_shared<spdlog::sinks::stderr_sink_st>());
+  auto logger =
+      std::make_shared<spdlog::logger>("farpointd", std::make_shared<spdlog::sinks::stderr_sink_st>());
   logger->set_pattern("farpointd: %l: %v");
   logger->set_level(spdlog::level::from_str(level));
   spdlog::set_default_logger(std::move(logger));
@@ -21,7 +22,9 @@ void start_logging(const std::string& level) {
 
 Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
 
-Progress::~Progress() { clear(); }
+Progress::~Progress() {
+  clear();
+}
 
 void Progress::show(double fraction, const std::string& text) {
   constexpr double kPeriod_s = 0.1;
@@ -34,7 +37,7 @@ void Progress::show(double fraction, const std::string& text) {
   std::string bar;
   if (fraction >= 0.0) {
     const auto filled = static_cast<std::size_t>(std::clamp(fraction, 0.0, 1.0) * kWidth);
-    bar = "[" + std::string(filled, '#') + std::string(kWidth - filled, '.') + "] ";
+    bar = fmt::format("[{}{}] ", std::string(filled, '#'), std::string(kWidth - filled, '.'));
   }
   std::fprintf(stderr, "\r\x1b[K%s%s", bar.c_str(), text.c_str());
   std::fflush(stderr);

@@ -1,4 +1,5 @@
-// The daemon's log on standard error: start, end, changes of state, what did not go as configured. Never a frame.
+// The daemon's log on standard error: start, end, changes of state, what did not go as configured. Never a
+// frame.
 #pragma once
 
 #include <string>

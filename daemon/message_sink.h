@@ -1,13 +1,11 @@
 // Where encoded LCM messages go.
 #pragma once
 
-#include <lcm/lcm.h>
-
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 
+#include "ipc/lcm_publisher.h"
 #include "ipc/log.h"
 
 namespace farpoint::daemon {
@@ -36,24 +34,18 @@ class LogMessageSink final : public MessageSink {
   std::uint64_t errors_ = 0;
 };
 
-// Onto the network through LCM. The control path only: the end-of-run messages (trajectory, summary) are for
-// logs.
+// Onto the network through LCM.
 class LcmMessageSink final : public MessageSink {
  public:
-  // Null where LCM cannot use the URL (no multicast route, unknown provider): replay goes on without.
-  [[nodiscard]] static std::unique_ptr<LcmMessageSink> open(const std::string& url);
-  ~LcmMessageSink() override;
-  LcmMessageSink(const LcmMessageSink&) = delete;
-  LcmMessageSink& operator=(const LcmMessageSink&) = delete;
+  // Throws std::runtime_error saying what the URL lacks (a multicast route, a known provider).
+  explicit LcmMessageSink(const std::string& url) : publisher_(url) {}
 
   void send(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) override;
-  [[nodiscard]] std::uint64_t errors() const override { return errors_; }
+  [[nodiscard]] std::uint64_t errors() const override { return publisher_.counts().failed; }
   [[nodiscard]] bool is_log() const override { return false; }
 
  private:
-  explicit LcmMessageSink(lcm_t* lcm) : lcm_(lcm) {}
-  lcm_t* lcm_;
-  std::uint64_t errors_ = 0;
+  ipc::LcmPublisher publisher_;
 };
 
 }  // namespace farpoint::daemon

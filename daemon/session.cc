@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::int64_t kAtOnce = std::numeric_limits<std::int64_t>::min();
 
-// True where a message of this rate is due. The next one is due a period after this frame, so that a gap in the
-// recording is not followed by a burst.
+// True where a message of this rate is due. The next one is due a period after this frame, so that a gap in
+// the recording is not followed by a burst.
 bool due(std::int64_t utime, double rate_hz, std::int64_t* next_utime) {
   if (rate_hz <= 0.0 || utime < *next_utime) return false;
   // Frames do not come at multiples of the period: half a millisecond early is on time.
@@ -30,7 +30,8 @@ std::size_t sum_bytes(const std::vector<std::pair<std::string, std::size_t>>& ta
 
 void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& table, std::size_t sum) {
   constexpr double kMegabyte = 1e6;
-  for (const auto& [name, bytes] : table) spdlog::info("memory {:<32} {:>9.3f} MB", name, double(bytes) / kMegabyte);
+  for (const auto& [name, bytes] : table)
+    spdlog::info("memory {:<32} {:>9.3f} MB", name, double(bytes) / kMegabyte);
   spdlog::info("memory {:<32} {:>9.3f} MB", "in all", double(sum) / kMegabyte);
 }
 
@@ -52,8 +53,8 @@ Session::Session(const Config& config, const slam::Rig& rig, std::string calibra
   print_memory_table(table, pool_bytes_);
 }
 
-const FrameOutput& Session::process(const slam::FrameInput& input, const InputCounts& in, const OutputCounts& out,
-                                    StageClock* clock) {
+const FrameOutput& Session::process(const slam::FrameInput& input, const InputCounts& in,
+                                    const OutputCounts& out, StageClock* clock) {
   {
     const StageScope scope(clock, timing_t::STAGE_FRAME);
     frame_ = make_frame_output(estimator_.process(input), config_.scale.assumed);
@@ -107,9 +108,10 @@ const RunEnd& Session::finish(const InputCounts& in) {
 
 void Session::note_state(const slam::FrameResult& result) {
   if (result.state == last_state_) return;
-  spdlog::debug("frame {} at {:.6f} s: {} -> {} (map {}, {} of {} features matched, {} agree)", result.sequence,
-                1e-6 * double(result.utime), slam::to_string(last_state_), slam::to_string(result.state), result.map_id,
-                result.matches, result.features, result.inliers);
+  spdlog::debug("frame {} at {:.6f} s: {} -> {} (map {}, {} of {} features matched, {} agree)",
+                result.sequence, 1e-6 * double(result.utime), slam::to_string(last_state_),
+                slam::to_string(result.state), result.map_id, result.matches, result.features,
+                result.inliers);
   last_state_ = result.state;
 }
 
@@ -127,7 +129,8 @@ void Session::publish_map(const FrameOutput& frame) {
                       make_map(frame, content, config_.lcm.map_points, unit_scale(frame.result.scale)));
 }
 
-status_t Session::make_status(const FrameOutput& frame, const InputCounts& in, const OutputCounts& out) const {
+status_t Session::make_status(const FrameOutput& frame, const InputCounts& in,
+                              const OutputCounts& out) const {
   const slam::FrameResult& r = frame.result;
   const slam::EstimatorCounts& counts = estimator_.counts();
   status_t s{};

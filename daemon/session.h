@@ -1,7 +1,7 @@
 // One run of the estimator and everything that is published of it, wherever the images come from.
 //
-// Lockstep: process() does all that one frame asks for, in one order. Times that are published derive from the frames'
-// utime; the measured ones go to FARPOINT_TIMING alone.
+// Lockstep: process() does all that one frame asks for, in one order. Times that are published derive from
+// the frames' utime; the measured ones go to FARPOINT_TIMING alone.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace farpoint::daemon {
 
 // What came in and what was refused, since the start.
 struct InputCounts {
-  std::int64_t images = 0;    // of all cameras
+  std::int64_t images = 0;  // of all cameras
   std::int64_t wrong_size = 0, undecodable = 0, unknown_camera = 0, times_backwards = 0;
   std::int64_t messages_undecodable = 0, log_damages = 0;
 };
@@ -32,13 +32,13 @@ struct OutputCounts {
 
 class Session {
  public:
-  // Allocates the estimator's memory. `sinks` get each frame in their order, then the publisher; all must outlive the
-  // session. Throws std::invalid_argument where configuration and rig cannot work together.
-  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash, std::vector<PoseSink*> sinks,
-          Publisher* publisher);
+  // Allocates the estimator's memory. `sinks` get each frame in their order, then the publisher; all must
+  // outlive the session. Throws std::invalid_argument where configuration and rig cannot work together.
+  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
+          std::vector<PoseSink*> sinks, Publisher* publisher);
 
-  // Tracks one image and hands the outcome to every sink. `clock` holds what the caller measured of this frame (the
-  // decoding) and gets the rest.
+  // Tracks one image and hands the outcome to every sink. `clock` holds what the caller measured of this
+  // frame (the decoding) and gets the rest.
   const FrameOutput& process(const slam::FrameInput& input, const InputCounts& in, const OutputCounts& out,
                              StageClock* clock);
 
@@ -52,7 +52,8 @@ class Session {
   void note_state(const slam::FrameResult& result);
   void publish_status(const FrameOutput& frame, const InputCounts& in, const OutputCounts& out);
   void publish_map(const FrameOutput& frame);
-  [[nodiscard]] status_t make_status(const FrameOutput& frame, const InputCounts& in, const OutputCounts& out) const;
+  [[nodiscard]] status_t make_status(const FrameOutput& frame, const InputCounts& in,
+                                     const OutputCounts& out) const;
   [[nodiscard]] double unit_scale(slam::ScaleState scale) const;
 
   Config config_;

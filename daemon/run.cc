@@ -1,0 +1,82 @@
+#include "daemon/run.h"
+
+#include <dlfcn.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+
+#include "daemon/build_info.h"
+#include "daemon/config.h"
+#include "daemon/logging.h"
+#include "daemon/options.h"
+#include "daemon/replay.h"
+#include "daemon/rig.h"
+
+namespace farpoint::daemon {
+namespace {
+
+constexpr const char* kSystemConfig = "/etc/farpoint/farpoint.yaml";
+constexpr int kFailed = 1, kWrongUse = 2;
+
+Config load_configuration(const Options& options, std::string* source) {
+  Config config;
+  ConfigOrigins origins;
+  std::error_code ignored;
+  *source = "built-in defaults";
+  if (options.config_path || std::filesystem::exists(kSystemConfig, ignored)) {
+    *source = options.config_path.value_or(kSystemConfig);
+    load_config_file(*source, &config, &origins);
+  }
+  for (const std::string& setting : options.settings) apply_setting(setting, &config, &origins);
+  check_relations(config, origins);
+  return config;
+}
+
+// Libraries that would start threads of their own sum in another order each time: one thread each.
+void make_libraries_single_threaded() {
+  cv::setNumThreads(1);
+  // Where this machine's BLAS is OpenBLAS; the reference BLAS has no threads.
+  if (void* set_threads = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
+    reinterpret_cast<void (*)(int)>(set_threads)(1);
+  }
+}
+
+int fail(const char* what, int status) {
+  std::fprintf(stderr, "farpointd: %s\n", what);
+  return status;
+}
+
+int run_checked(int argc, const char* const* argv) {
+  const CommandLine line = parse_command_line(argc, argv);
+  if (!line.text_and_leave.empty()) {
+    std::fputs(line.text_and_leave.c_str(), stdout);
+    return 0;
+  }
+  std::string source;
+  const Config config = load_configuration(line.options, &source);
+  start_logging(config.log.level);
+  spdlog::info("farpointd {}, configuration {} ({:016x}), lockstep replay of {}", build_text(), source,
+               config_hash(config), line.options.replay);
+  make_libraries_single_threaded();
+  return replay_lockstep(line.options, config);
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv) {
+  try {
+    return run_checked(argc, argv);
+  } catch (const UsageError& error) {
+    return fail(error.what(), kWrongUse);
+  } catch (const ConfigError& error) {
+    return fail(error.what(), kWrongUse);
+  } catch (const InputError& error) {
+    return fail(error.what(), kWrongUse);
+  } catch (const std::exception& error) {
+    return fail(error.what(), kFailed);
+  }
+}
+
+}  // namespace farpoint::daemon
