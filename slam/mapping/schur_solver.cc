@@ -1,11 +1,12 @@
 // Levenberg-Marquardt on the Schur complement of one-dimensional landmarks.
 //
-// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1) / 2
-// rank-one 6x6 updates; general solvers do not specialise to that (tests/bench/bench_solvers.cc compares with Ceres).
+// Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1)
+// / 2 rank-one 6x6 updates; general solvers do not specialise to that (tests/bench/bench_solvers.cc compares
+// with Ceres).
 //
-// Pose steps are taken in world axes here, (dt_w, dphi_w) = (R dt, R dphi) with the (dt, dphi) of se3.h: a landmark's
-// derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t, without a rotation for
-// every measurement, and the same for host and target but for the sign.
+// Pose steps are taken in world axes here, (dt_w, dphi_w) = (R dt, R dphi) with the (dt, dphi) of se3.h: a
+// landmark's derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t,
+// without a rotation for every measurement, and the same for host and target but for the sign.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -49,8 +50,8 @@ Matrix26d carried(const Matrix23d& d_xyz, double scale, const BundleFrames::Worl
   return J;
 }
 
-// Symmetric matrix of 6x6 blocks, upper triangle, each block in one piece of memory: the rank-one updates of the
-// Schur complement are most of the work, and stay within few cache lines.
+// Symmetric matrix of 6x6 blocks, upper triangle, each block in one piece of memory: the rank-one updates of
+// the Schur complement are most of the work, and stay within few cache lines.
 class BlockMatrix {
  public:
   void resize(int blocks) {
@@ -79,12 +80,12 @@ class BlockMatrix {
 
 // A landmark's part of the normal equations.
 struct PointBlock {
-  double hessian = 0, gradient = 0;    // hessian 0: not moved in this step
+  double hessian = 0, gradient = 0;  // hessian 0: not moved in this step
   int first_coupling = 0, couplings = 0;
 };
 // d2(cost) / d(pose) d(inverse depth) for one free pose.
 struct Coupling {
-  int pose = 0;    // index among the free poses
+  int pose = 0;  // index among the free poses
   Vector6d w = Vector6d::Zero();
 };
 
@@ -109,7 +110,7 @@ class SchurSolver {
 
   BundleSummary run(const BundleOptions& options) {
     BundleSummary summary;
-    summary.initial_cost = summary.final_cost = cost();
+    summary.initial_cost = summary.final_cost = total_cost();
     summary.usable = std::isfinite(summary.initial_cost);
     double lambda = 1e-4;
     double growth = 2.0;
@@ -123,8 +124,8 @@ class SchurSolver {
         continue;
       }
       save();
-      apply();
-      const double now = cost();
+      move_poses();
+      const double now = move_points();
       if (!(now < summary.final_cost)) {
         restore();
         lambda *= growth, growth *= 2.0;
@@ -141,19 +142,27 @@ class SchurSolver {
   }
 
  private:
-  [[nodiscard]] const BundleProblem::Measurement& measurement(const BundleProblem::Point& point, int i) const {
+  [[nodiscard]] const BundleProblem::Measurement& measurement(const BundleProblem::Point& point,
+                                                              int i) const {
     return p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
   }
 
-  [[nodiscard]] double cost() const {
+  [[nodiscard]] double total_cost() {
     double sum = 0.0;
+    point_cost_.clear();
     for (const auto& point : p_.points) {
-      const BundleFrames::WorldPoint world = frames_.world_point(point);
-      for (int i = 0; i < point.measurements; ++i) {
-        Eigen::Vector2d r;
-        const auto& m = measurement(point, i);
-        sum += residual_world(world, frames_.view(m), m, &r) ? huber_cost(r.squaredNorm()) : kLostCost;
-      }
+      point_cost_.push_back(cost_of(point));
+      sum += point_cost_.back();
+    }
+    return sum;
+  }
+  [[nodiscard]] double cost_of(const BundleProblem::Point& point) const {
+    const BundleFrames::WorldPoint world = frames_.world_point(point);
+    double sum = 0.0;
+    for (int i = 0; i < point.measurements; ++i) {
+      Eigen::Vector2d r;
+      const auto& m = measurement(point, i);
+      sum += residual_world(world, frames_.view(m), m, &r) ? huber_cost(r.squaredNorm()) : kLostCost;
     }
     return sum;
   }
@@ -181,7 +190,7 @@ class SchurSolver {
       const double w = huber_weight(lin.residual.squaredNorm());
       block->hessian += w * lin.d_inverse_depth.squaredNorm();
       block->gradient += w * lin.d_inverse_depth.dot(lin.residual);
-      if (m.pose == point.host) continue;    // host and target move together: nothing changes
+      if (m.pose == point.host) continue;  // host and target move together: nothing changes
       const int target = free_index_[static_cast<std::size_t>(m.pose)];
       if (host >= 0) {
         const Eigen::Matrix<double, 3, 2> weighted = w * lin.d_xyz.transpose();
@@ -255,8 +264,7 @@ class SchurSolver {
     for (int j = 0; j < b.couplings; ++j) {
       const Vector6d scaled = inverse_hessian * c[j].w;
       reduced_gradient_.segment<6>(6 * c[j].pose) -= scaled * b.gradient;
-      for (int i = 0; i <= j; ++i)
-        reduced_.at(c[i].pose, c[j].pose).noalias() -= c[i].w * scaled.transpose();
+      for (int i = 0; i <= j; ++i) reduced_.at(c[i].pose, c[j].pose).noalias() -= c[i].w * scaled.transpose();
     }
   }
 
@@ -272,24 +280,48 @@ class SchurSolver {
     for (const std::size_t i : free_poses_) saved_poses_.push_back(p_.poses[i].T_world_body);
     saved_depths_.clear();
     for (const auto& point : p_.points) saved_depths_.push_back(point.inverse_depth);
+    saved_point_cost_ = point_cost_;
   }
   void restore() {
     for (std::size_t i = 0; i < free_poses_.size(); ++i)
       p_.poses[free_poses_[i]].T_world_body = saved_poses_[i];
     for (std::size_t k = 0; k < p_.points.size(); ++k) p_.points[k].inverse_depth = saved_depths_[k];
+    point_cost_ = saved_point_cost_;
     frames_.update(p_);
   }
-  void apply() {
+
+  void move_poses() {
     for (std::size_t i = 0; i < free_poses_.size(); ++i) {
       SE3& T = p_.poses[free_poses_[i]].T_world_body;
       const auto first = static_cast<Eigen::Index>(6 * i);
       T.t += pose_step_.segment<3>(first);
       T.q = (so3_exp(pose_step_.segment<3>(first + 3)) * T.q).normalized();
     }
-    // Nothing lies beyond infinity.
-    for (std::size_t k = 0; k < p_.points.size(); ++k)
-      p_.points[k].inverse_depth = std::max(0.0, p_.points[k].inverse_depth + point_step_[k]);
     frames_.update(p_);
+  }
+  // The cost of it all afterwards.
+  [[nodiscard]] double move_points() {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < p_.points.size(); ++k) sum += move_point(k);
+    return sum;
+  }
+  // A landmark whose own cost rises (its ray runs through a camera, say, where inverse depth is far from
+  // linear) goes a shorter way or stays: it must not hold up all the others, as it would by having the whole
+  // step refused.
+  double move_point(std::size_t k) {
+    BundleProblem::Point& point = p_.points[k];
+    const double start = point.inverse_depth, before = point_cost_[k];
+    const auto go = [&](double share) {
+      // Nothing lies beyond infinity.
+      point.inverse_depth = std::max(0.0, start + share * point_step_[k]);
+      return point_cost_[k] = cost_of(point);
+    };
+    const double all_the_way = go(1.0);
+    if (all_the_way <= before || point_step_[k] == 0.0) return all_the_way;
+    const double stayed = go(0.0);
+    for (const double share : {1.0, 0.125, 0.015625})
+      if (go(share) < stayed) return point_cost_[k];
+    return go(0.0);
   }
 
   BundleProblem& p_;
@@ -300,8 +332,8 @@ class SchurSolver {
   Eigen::MatrixXd dense_;
   Eigen::VectorXd gradient_, reduced_gradient_, pose_step_;
   std::vector<PointBlock> blocks_;
-  std::vector<Coupling> couplings_;    // grouped by point
-  std::vector<double> point_step_;
+  std::vector<Coupling> couplings_;  // grouped by point
+  std::vector<double> point_step_, point_cost_, saved_point_cost_;
   std::vector<SE3> saved_poses_;
   std::vector<double> saved_depths_;
 };
