@@ -1,3 +1,5 @@
 #include "tools/commands/commands.h"
 
-int main(int argc, char** argv) { return farpoint::tools::run_farpoint(argc, argv); }
+int main(int argc, char** argv) {
+  return farpoint::tools::run_farpoint(argc, argv);
+}

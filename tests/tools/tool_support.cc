@@ -45,7 +45,8 @@ void replace_in(const fs::path& file, const std::string& from, const std::string
 std::string make_image(const std::string& extension, int width_px, int height_px, int shade) {
   cv::Mat image(height_px, width_px, CV_8UC1);
   for (int y = 0; y < height_px; ++y) {
-    for (int x = 0; x < width_px; ++x) image.at<unsigned char>(y, x) = static_cast<unsigned char>(x + y + shade);
+    for (int x = 0; x < width_px; ++x)
+      image.at<unsigned char>(y, x) = static_cast<unsigned char>(x + y + shade);
   }
   std::vector<unsigned char> bytes;
   cv::imencode(extension, image, bytes);
@@ -89,7 +90,7 @@ void make_euroc(const fs::path& root) {
   std::string truth = "#timestamp, p, p, p, q, q, q, q, v, v, v\n";
   for (int i = 0; i < 5; ++i) {
     const std::string stamp = "140363657976355" + std::to_string(5 + i) + "584";
-    list += stamp + "," + stamp + ".png\r\n";   // the data set's own lists have Windows line ends
+    list += stamp + "," + stamp + ".png\r\n";  // the data set's own lists have Windows line ends
     put(mav0 / "cam0" / "data" / (stamp + ".png"), make_image(".png", 64, 48, i));
     if (i != 2) put(mav0 / "cam1" / "data" / (stamp + ".png"), make_image(".png", 64, 48, 9 + i));
     imu += stamp + ",0.1,0.2,0.3,9.8,0.5,-0.5\n";
@@ -133,7 +134,7 @@ Trajectory random_path(std::mt19937_64* random, int n, double rate_hz, double st
   Trajectory path;
   slam::SE3 pose;
   slam::Vector6d step;
-  step << 0.8, 0.0, 0.0, 0.0, 0.0, 0.0;   // forward
+  step << 0.8, 0.0, 0.0, 0.0, 0.0, 0.0;  // forward
   for (int i = 0; i < n; ++i) {
     path.poses.push_back({start_s + i / rate_hz, pose, 0});
     for (int k = 3; k < 6; ++k) step[k] = 0.9 * step[k] + 0.01 * normal(*random);

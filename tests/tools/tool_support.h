@@ -42,14 +42,15 @@ struct ProgramResult {
 [[nodiscard]] ProgramResult run_farpoint_program(const std::string& arguments);
 
 // Small recordings of each layout: 5 frames of 64x48 pixels, stereo where the layout has it.
-void make_kitti(const std::filesystem::path& root);    // sequence "07"
+void make_kitti(const std::filesystem::path& root);  // sequence "07"
 void make_euroc(const std::filesystem::path& root);
-void make_tum(const std::filesystem::path& root);      // with camera.yaml beside rgb.txt
+void make_tum(const std::filesystem::path& root);  // with camera.yaml beside rgb.txt
 
 // A smooth random path of `n` poses, `rate_hz` a second, from `start_s` on.
 [[nodiscard]] Trajectory random_path(std::mt19937_64* random, int n, double rate_hz, double start_s);
 // The same path seen in another frame, unit and with noise.
-[[nodiscard]] Trajectory disturbed(const Trajectory& path, double scale, double noise_m, std::mt19937_64* random);
+[[nodiscard]] Trajectory disturbed(const Trajectory& path, double scale, double noise_m,
+                                   std::mt19937_64* random);
 
 // Folder of recordings outside the repository; empty where it is absent.
 [[nodiscard]] std::filesystem::path shared_folder();
@@ -57,7 +58,7 @@ void make_tum(const std::filesystem::path& root);      // with camera.yaml besid
 // `key=value` in a line of such pairs; the test fails where it is absent.
 [[nodiscard]] std::string value_of(const std::string& line, const std::string& key);
 
-#define SKIP_WITHOUT_SHARED_DATA()                                                             \
+#define SKIP_WITHOUT_SHARED_DATA() \
   if (shared_folder().empty()) GTEST_SKIP() << "no recordings beside the repository (../shared/data)"
 
 }  // namespace farpoint::tools

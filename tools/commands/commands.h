@@ -1,5 +1,5 @@
-// The sub-commands of `farpoint`. Each add_*() declares one on the command line; when it was given, the function it
-// leaves in `action` does the work and returns the exit status.
+// The sub-commands of `farpoint`. Each add_*() declares one on the command line; when it was given, the
+// function it leaves in `action` does the work and returns the exit status.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -13,7 +13,8 @@ void add_import_command(CLI::App* app, Action* action);
 void add_export_command(CLI::App* app, Action* action);
 void add_evaluate_command(CLI::App* app, Action* action);
 
-// The whole program: parses, runs, and turns every failure into one line on standard error and an exit status.
+// The whole program: parses, runs, and turns every failure into one line on standard error and an exit
+// status.
 int run_farpoint(int argc, const char* const* argv);
 
 }  // namespace farpoint::tools

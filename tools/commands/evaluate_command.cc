@@ -31,7 +31,8 @@ std::size_t frame_number(std::string_view text, const std::string& all) {
   std::size_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) {
-    throw InputError("--segments '" + all + "': expected FROM:TO[,FROM:TO...] in frames, found '" + std::string(text) + "'");
+    throw InputError("--segments '" + all + "': expected FROM:TO[,FROM:TO...] in frames, found '" +
+                     std::string(text) + "'");
   }
   return value;
 }
@@ -43,7 +44,8 @@ std::vector<FrameRange> parse_segments(const std::string& text) {
     const std::string_view item = std::string_view(text).substr(begin, end - begin);
     const std::size_t colon = item.find(':');
     if (colon == std::string_view::npos) {
-      throw InputError("--segments '" + text + "': expected FROM:TO[,FROM:TO...], found '" + std::string(item) + "'");
+      throw InputError("--segments '" + text + "': expected FROM:TO[,FROM:TO...], found '" +
+                       std::string(item) + "'");
     }
     ranges.push_back({frame_number(item.substr(0, colon), text), frame_number(item.substr(colon + 1), text)});
     begin = end + 1;
@@ -100,7 +102,8 @@ int run_evaluate(const EvaluateOptions& options) {
   const EvaluationOptions evaluation = to_evaluation_options(options);
   const Truth truth = read_truth(options.truth);
   std::vector<RunMetrics> runs;
-  for (const std::string& file : options.runs) runs.push_back(evaluate_run(read_run(file), truth, evaluation));
+  for (const std::string& file : options.runs)
+    runs.push_back(evaluate_run(read_run(file), truth, evaluation));
   make_names_unique(options.runs, &runs);
   options.json ? print_json(runs) : print_text(runs);
   return check_expectations(options.expectations, runs) ? kExitDone : kExitFailed;
@@ -112,44 +115,54 @@ void add_evaluate_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<EvaluateOptions>();
   CLI::App* command = app->add_subcommand("evaluate", "Say how good runs are against truth, side by side");
   command->add_option("RUN", options->runs, "Output logs of farpointd, or TUM trajectory files")->required();
-  command->add_option("--truth", options->truth, "The recording (LCM log with GROUND_TRUTH), or a TUM file")->required();
+  command->add_option("--truth", options->truth, "The recording (LCM log with GROUND_TRUTH), or a TUM file")
+      ->required();
   command
-      ->add_option("--align", options->align,
-                   "sim3: rotation, translation, scale; se3: no scale; none. Default: se3 for a run of metric scale,\n"
-                   "else sim3")
+      ->add_option(
+          "--align", options->align,
+          "sim3: rotation, translation, scale; se3: no scale; none. Default: se3 for a run of metric scale,\n"
+          "else sim3")
       ->check(CLI::IsMember({"sim3", "se3", "none"}));
   command->add_flag("--planar", options->planar, "Absolute error and alignment in x and y of the truth only");
   command->add_flag("--json", options->json, "Machine-readable, on one line");
   command
-      ->add_option("--truth-point", options->truth_point,
-                   "Which point of the vehicle is compared: body, camera0 (the truth is moved there by the log's\n"
-                   "extrinsics), or auto (default): camera0 where the run's scale is unknown, since its body then\n"
-                   "stands at camera 0, else body. A TUM run aligned by sim3 counts as of unknown scale")
+      ->add_option(
+          "--truth-point", options->truth_point,
+          "Which point of the vehicle is compared: body, camera0 (the truth is moved there by the log's\n"
+          "extrinsics), or auto (default): camera0 where the run's scale is unknown, since its body then\n"
+          "stands at camera 0, else body. A TUM run aligned by sim3 counts as of unknown scale")
       ->check(CLI::IsMember({"auto", "body", "camera0"}));
-  command->add_option("--frames", options->frames, "Frames of the recording, for the share (default: from the truth's log)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--segments", options->segments,
-                      "FROM:TO[,FROM:TO...] in frames, TO not included: the scale of each stretch of the final\n"
-                      "trajectory, aligned by itself, and its ratio to the first one's");
   command
-      ->add_option("--expect", options->expectations,
-                   "Condition 'NAME.METRIC OP [FACTOR] NAME.METRIC' or 'NAME.METRIC OP NUMBER', repeatable; exit\n"
-                   "status 1 where one is broken. NAME is a run's file stem, OP one of < <= > >= ==, METRIC ate,\n"
-                   "live_ate, a key of 'final', or a dotted path into --json. A missing figure breaks it")
+      ->add_option("--frames", options->frames,
+                   "Frames of the recording, for the share (default: from the truth's log)")
+      ->check(CLI::PositiveNumber);
+  command->add_option(
+      "--segments", options->segments,
+      "FROM:TO[,FROM:TO...] in frames, TO not included: the scale of each stretch of the final\n"
+      "trajectory, aligned by itself, and its ratio to the first one's");
+  command
+      ->add_option(
+          "--expect", options->expectations,
+          "Condition 'NAME.METRIC OP [FACTOR] NAME.METRIC' or 'NAME.METRIC OP NUMBER', repeatable; exit\n"
+          "status 1 where one is broken. NAME is a run's file stem, OP one of < <= > >= ==, METRIC ate,\n"
+          "live_ate, a key of 'final', or a dotted path into --json. A missing figure breaks it")
       ->expected(1)
       ->take_all();
   command->footer(
-      "Pairs each pose with the truth nearest in time (at most 20 ms), aligns (Umeyama), and prints for each run the\n"
+      "Pairs each pose with the truth nearest in time (at most 20 ms), aligns (Umeyama), and prints for each "
+      "run the\n"
       "details, then one table with one row a run, the last run's last.\n"
       "  final  every frame's pose after the last optimisation      live  as published when the frame came\n"
       "  share  poses with truth, of all frames of the recording    ATE   RMS position error\n"
       "  RPE    over 100, 200 .. 800 m of path, and over one second (truth interpolated)\n"
-      "  depth  when a point was made; distance: over all observations of the final map; metres by the alignment\n"
+      "  depth  when a point was made; distance: over all observations of the final map; metres by the "
+      "alignment\n"
       "  VMP %  points made through a virtual map point, of all points made\n"
       "Examples:\n"
       "  farpoint evaluate run.lcm --truth kitti03.lcm\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --segments 0:70,110:400\n"
-      "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --expect 'vmp.ate <= 1.03 baseline.ate' \\\n"
+      "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --expect 'vmp.ate <= 1.03 baseline.ate' "
+      "\\\n"
       "      --expect 'vmp.final.share >= 0.98'\n"
       "  farpoint evaluate final.tum --truth truth.tum --align se3 --json");
   command->callback([=] { *action = [=] { return run_evaluate(*options); }; });

@@ -13,7 +13,7 @@ namespace {
 struct ExportOptions {
   std::string log, output = "-";
   bool truth = false;
-  std::string trajectory;            // "", final, live
+  std::string trajectory;  // "", final, live
   std::string point = "body";
   std::string origin = "world";
 };
@@ -24,7 +24,8 @@ Trajectory truth_of(const ExportOptions& options) {
     throw InputError(options.log + ": no GROUND_TRUTH messages, expected a recording with truth");
   }
   if (options.point == "camera0") {
-    if (!log.calibration) throw InputError(options.log + ": no CALIBRATION message, --point camera0 needs one");
+    if (!log.calibration)
+      throw InputError(options.log + ": no CALIBRATION message, --point camera0 needs one");
     const Eigen::Vector3d lever_arm = log.T_body_camera0().t;
     if (!log.truth.has_orientation && !lever_arm.isZero()) {
       throw InputError(options.log + ": truth of position only, --point camera0 needs its orientation");
@@ -37,7 +38,8 @@ Trajectory truth_of(const ExportOptions& options) {
 Trajectory trajectory_of(const ExportOptions& options) {
   RunLog log = read_run_log(options.log);
   if (options.trajectory == "final") {
-    if (!log.has_trajectory) throw InputError(options.log + ": no FARPOINT_TRAJECTORY message, did farpointd end in order?");
+    if (!log.has_trajectory)
+      throw InputError(options.log + ": no FARPOINT_TRAJECTORY message, did farpointd end in order?");
     return std::move(log.final_trajectory);
   }
   return std::move(log.live_trajectory);
@@ -62,7 +64,8 @@ int run_export(const ExportOptions& options) {
   }
   Trajectory trajectory = options.truth ? truth_of(options) : trajectory_of(options);
   if (options.origin == "first" && !trajectory.poses.empty()) {
-    if (!trajectory.has_orientation) throw InputError("--origin first: the truth has positions only, expected orientation too");
+    if (!trajectory.has_orientation)
+      throw InputError("--origin first: the truth has positions only, expected orientation too");
     start_at_origin(&trajectory);
   }
   write(options.output, to_tum(trajectory));
@@ -75,23 +78,30 @@ int run_export(const ExportOptions& options) {
 void add_export_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App* command = app->add_subcommand("export", "Write the truth or a trajectory of a log as a TUM file");
-  command->add_option("LOG", options->log, "Recording (for --truth) or output log of farpointd (for --trajectory)")
+  command
+      ->add_option("LOG", options->log,
+                   "Recording (for --truth) or output log of farpointd (for --trajectory)")
       ->required();
   command->add_flag("--truth", options->truth, "The recording's truth: T_world_body");
-  command->add_option("--trajectory", options->trajectory, "final: after the last optimisation; live: as published")
+  command
+      ->add_option("--trajectory", options->trajectory,
+                   "final: after the last optimisation; live: as published")
       ->check(CLI::IsMember({"final", "live"}));
   command->add_option("-o,--output", options->output, "File to write; '-' (the default) is standard output");
   command
-      ->add_option("--point", options->point,
-                   "With --truth: the point that is followed. camera0: its position, with the body's axes, where a\n"
-                   "run of unknown scale has its body")
+      ->add_option(
+          "--point", options->point,
+          "With --truth: the point that is followed. camera0: its position, with the body's axes, where a\n"
+          "run of unknown scale has its body")
       ->check(CLI::IsMember({"body", "camera0"}));
   command
-      ->add_option("--origin", options->origin,
-                   "world: the data set's own world. first: the first pose becomes the origin, as for T_map_body")
+      ->add_option(
+          "--origin", options->origin,
+          "world: the data set's own world. first: the first pose becomes the origin, as for T_map_body")
       ->check(CLI::IsMember({"world", "first"}));
   command->footer(
-      "TUM format: 'seconds tx ty tz qx qy qz qw' of the body, seconds with 6 decimals; truth of position only has\n"
+      "TUM format: 'seconds tx ty tz qx qy qz qw' of the body, seconds with 6 decimals; truth of position "
+      "only has\n"
       "the quaternion 0 0 0 1.\n"
       "Examples:\n"
       "  farpoint export kitti03.lcm --truth -o truth.tum\n"

@@ -17,11 +17,12 @@ struct ImportOptions {
 };
 
 void print_summary(const Recording& recording, const std::string& output) {
-  const double seconds = static_cast<double>(recording.images.back().utime - recording.images.front().utime) * 1e-6;
-  std::printf("%s: %zu camera%s, %zu images (%zu missing), %.1f s, %zu IMU samples, %zu truth %s\n", output.c_str(),
-              recording.cameras.size(), recording.cameras.size() == 1 ? "" : "s", recording.images.size(),
-              recording.missing_images, seconds, recording.imu.size(), recording.truth.size(),
-              recording.truth_has_orientation ? "poses" : "positions");
+  const double seconds =
+      static_cast<double>(recording.images.back().utime - recording.images.front().utime) * 1e-6;
+  std::printf("%s: %zu camera%s, %zu images (%zu missing), %.1f s, %zu IMU samples, %zu truth %s\n",
+              output.c_str(), recording.cameras.size(), recording.cameras.size() == 1 ? "" : "s",
+              recording.images.size(), recording.missing_images, seconds, recording.imu.size(),
+              recording.truth.size(), recording.truth_has_orientation ? "poses" : "positions");
 }
 
 int write_and_report(const Recording& recording, const std::string& output) {
@@ -33,7 +34,8 @@ int write_and_report(const Recording& recording, const std::string& output) {
 CLI::App* add_layout(CLI::App* import, const char* name, const char* description, ImportOptions* options) {
   CLI::App* layout = import->add_subcommand(name, description);
   layout->add_option("DIR", options->folder, "Folder of the recording")->required();
-  layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")->required();
+  layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
+      ->required();
   return layout;
 }
 
@@ -43,9 +45,11 @@ void add_import_command(CLI::App* app, Action* action) {
   CLI::App* import = app->add_subcommand("import", "Turn a recording of a public data set into an LCM log");
   import->require_subcommand(1);
   import->footer(
-      "The log holds CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in the order of their times; image files\n"
+      "The log holds CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in the order of their times; "
+      "image files\n"
       "are copied as they are (PNG or JPEG). utime is the data set's own time in microseconds.\n"
-      "KITTI and TUM name no body: it stands at camera 0, x forward, y left, z up. Truth is of the body, in the data\n"
+      "KITTI and TUM name no body: it stands at camera 0, x forward, y left, z up. Truth is of the body, in "
+      "the data\n"
       "set's own world.\n"
       "Examples:\n"
       "  farpoint import kitti /data/kitti 03 -o kitti03.lcm\n"
@@ -56,23 +60,30 @@ void add_import_command(CLI::App* app, Action* action) {
   CLI::App* kitti = add_layout(import, "kitti", "KITTI odometry: DIR/sequences/SEQUENCE", options.get());
   kitti->add_option("SEQUENCE", options->sequence, "Name of the sequence, like 03")->required();
   kitti->footer(
-      "Reads calib.txt, times.txt (absent: 0.1 s apart), image_0, image_1 where there is one, and truth from\n"
+      "Reads calib.txt, times.txt (absent: 0.1 s apart), image_0, image_1 where there is one, and truth "
+      "from\n"
       "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').");
   kitti->callback([=] {
-    *action = [=] { return write_and_report(read_kitti(options->folder, options->sequence), options->output); };
+    *action = [=] {
+      return write_and_report(read_kitti(options->folder, options->sequence), options->output);
+    };
   });
 
   CLI::App* euroc = add_layout(import, "euroc", "EuRoC (ASL): DIR holds mav0, or is it", options.get());
   euroc->footer(
-      "Reads cam0, cam1 and imu0 where there are any, and state_groundtruth_estimate0. Images missing on one side are\n"
+      "Reads cam0, cam1 and imu0 where there are any, and state_groundtruth_estimate0. Images missing on one "
+      "side are\n"
       "counted and left out.");
-  euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder), options->output); }; });
+  euroc->callback(
+      [=] { *action = [=] { return write_and_report(read_euroc(options->folder), options->output); }; });
 
   CLI::App* tum = add_layout(import, "tum", "TUM RGB-D: DIR holds rgb.txt", options.get());
   tum->add_option("--camera", options->camera_file, "Camera file, as in config/cameras")->required();
   tum->footer("Reads rgb.txt and groundtruth.txt where there is one. Depth is not read.");
   tum->callback([=] {
-    *action = [=] { return write_and_report(read_tum_rgbd(options->folder, options->camera_file), options->output); };
+    *action = [=] {
+      return write_and_report(read_tum_rgbd(options->folder, options->camera_file), options->output);
+    };
   });
 }
 

@@ -25,6 +25,19 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   return report(std::string(error.what()) + " (see farpoint --help)", kExitMisused);
 }
 
+// CLI11 would only say that a command is missing. Empty where the first word is a command or an option.
+std::string unknown_command(const CLI::App& app, int argc, const char* const* argv) {
+  const std::string word = argc > 1 ? argv[1] : "";
+  if (word.starts_with('-')) return {};
+  std::string known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == word) return {};
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  return (word.empty() ? "no command" : "unknown command '" + word + "'") +
+         std::string(", expected one of: ") + known + " (see farpoint --help)";
+}
+
 }  // namespace
 
 int run_farpoint(int argc, const char* const* argv) {
@@ -44,6 +57,8 @@ int run_farpoint(int argc, const char* const* argv) {
   add_import_command(&app, &action);
   add_export_command(&app, &action);
   add_evaluate_command(&app, &action);
+  const std::string unknown = unknown_command(app, argc, argv);
+  if (!unknown.empty()) return report(unknown, kExitMisused);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,5 +1,5 @@
-// The two ways in which a command of `farpoint` ends badly. Both carry one line that says what is wrong, where, and
-// what was expected; the exit status follows from the type.
+// The two ways in which a command of `farpoint` ends badly. Both carry one line that says what is wrong,
+// where, and what was expected; the exit status follows from the type.
 #pragma once
 
 #include <stdexcept>
@@ -8,8 +8,8 @@
 namespace farpoint::tools {
 
 inline constexpr int kExitDone = 0;
-inline constexpr int kExitFailed = 1;    // failed while running, or a condition of --expect is broken
-inline constexpr int kExitMisused = 2;   // wrong use, configuration or input
+inline constexpr int kExitFailed = 1;   // failed while running, or a condition of --expect is broken
+inline constexpr int kExitMisused = 2;  // wrong use, configuration or input
 
 // Wrong use or input: exit status 2.
 class InputError : public std::runtime_error {

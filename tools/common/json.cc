@@ -24,7 +24,7 @@ std::string quoted(const std::string& text) {
 }
 
 std::string number_text(double value) {
-  if (!std::isfinite(value)) return "null";   // JSON knows neither NaN nor infinity
+  if (!std::isfinite(value)) return "null";  // JSON knows neither NaN nor infinity
   char text[32];
   std::snprintf(text, sizeof text, "%.10g", value);
   return text;

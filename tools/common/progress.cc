@@ -10,7 +10,8 @@ Progress::Progress(std::string label, std::size_t total)
     : label_(std::move(label)), total_(total), terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
-  if (terminal_ && shown_percent_ >= 0) std::fprintf(stderr, "\r\033[K");   // leave a clean line for what follows
+  if (terminal_ && shown_percent_ >= 0)
+    std::fprintf(stderr, "\r\033[K");  // leave a clean line for what follows
 }
 
 void Progress::advance(std::size_t done) {

@@ -17,7 +17,8 @@ constexpr double kMaxSeconds = 9e9;
 
 }  // namespace
 
-FieldLine::FieldLine(const std::filesystem::path* file, int number, std::string text, std::string_view separators)
+FieldLine::FieldLine(const std::filesystem::path* file, int number, std::string text,
+                     std::string_view separators)
     : file_(file), number_(number), text_(std::move(text)) {
   std::size_t begin = text_.find_first_not_of(separators);
   while (begin != std::string::npos) {
@@ -43,7 +44,7 @@ void FieldLine::require_fields(std::size_t count, std::string_view layout) const
 
 double FieldLine::number_at(std::size_t i, std::string_view what) const {
   std::string_view field = text(i);
-  if (field.starts_with('+')) field.remove_prefix(1);   // from_chars takes no plus sign
+  if (field.starts_with('+')) field.remove_prefix(1);  // from_chars takes no plus sign
   double value = 0.0;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
   if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value)) {
@@ -72,7 +73,8 @@ std::int64_t FieldLine::utime_from_seconds_at(std::size_t i, std::string_view wh
 
 std::int64_t FieldLine::utime_from_nanoseconds_at(std::size_t i, std::string_view what) const {
   const std::int64_t nanoseconds = integer_at(i, what);
-  if (nanoseconds < 0) fail("expected " + std::string(what) + " >= 0 ns, found '" + std::string(text(i)) + "'");
+  if (nanoseconds < 0)
+    fail("expected " + std::string(what) + " >= 0 ns, found '" + std::string(text(i)) + "'");
   return nanoseconds / 1000 + (nanoseconds % 1000 >= 500 ? 1 : 0);
 }
 

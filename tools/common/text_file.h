@@ -1,5 +1,5 @@
-// Line-oriented text files of the data sets: fields with the file and line they stand in, so that every complaint
-// can name both.
+// Line-oriented text files of the data sets: fields with the file and line they stand in, so that every
+// complaint can name both.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +20,8 @@ class FieldLine {
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] std::string_view text(std::size_t i) const;
 
-  // Field i as a finite number, as an integer, as seconds turned into microseconds, as nanoseconds turned into
-  // microseconds (both rounded to nearest). `what` names the value in the error. Throw InputError.
+  // Field i as a finite number, as an integer, as seconds turned into microseconds, as nanoseconds turned
+  // into microseconds (both rounded to nearest). `what` names the value in the error. Throw InputError.
   [[nodiscard]] double number_at(std::size_t i, std::string_view what) const;
   [[nodiscard]] std::int64_t integer_at(std::size_t i, std::string_view what) const;
   [[nodiscard]] std::int64_t utime_from_seconds_at(std::size_t i, std::string_view what) const;
@@ -33,10 +33,10 @@ class FieldLine {
   [[noreturn]] void fail(const std::string& message) const;
 
  private:
-  const std::filesystem::path* file_;   // owned by the FieldFile
+  const std::filesystem::path* file_;  // owned by the FieldFile
   int number_;
   std::string text_;
-  std::vector<std::pair<std::size_t, std::size_t>> fields_;   // offset and length in text_
+  std::vector<std::pair<std::size_t, std::size_t>> fields_;  // offset and length in text_
 };
 
 // A text file read whole. Windows line ends and a missing last line end are accepted.

@@ -44,7 +44,9 @@ double YamlFile::finite_number(const YAML::Node& node, const std::string& name) 
   return value;
 }
 
-double YamlFile::number(const std::string& key) const { return finite_number(require(key), key); }
+double YamlFile::number(const std::string& key) const {
+  return finite_number(require(key), key);
+}
 
 double YamlFile::number_or(const std::string& key, double fallback) const {
   return has(key) ? number(key) : fallback;
@@ -67,8 +69,10 @@ std::vector<double> YamlFile::numbers(const std::string& key, const std::vector<
   }
   if (!node.IsSequence() || std::find(lengths.begin(), lengths.end(), values.size()) == lengths.end()) {
     std::string wanted;
-    for (const std::size_t length : lengths) wanted += (wanted.empty() ? "" : " or ") + std::to_string(length);
-    fail(node, "expected a list of " + wanted + " numbers for '" + key + "', found " + std::to_string(values.size()));
+    for (const std::size_t length : lengths)
+      wanted += (wanted.empty() ? "" : " or ") + std::to_string(length);
+    fail(node, "expected a list of " + wanted + " numbers for '" + key + "', found " +
+                   std::to_string(values.size()));
   }
   return values;
 }
@@ -81,7 +85,8 @@ slam::SE3 YamlFile::rigid_motion(const YAML::Node& list, const std::string& name
   for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = finite_number(list[static_cast<std::size_t>(i)], name);
   slam::SE3 motion;
   if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1) || !to_rigid_motion(matrix.topRows<3>(), &motion)) {
-    fail(list, "expected a rigid motion for '" + name + "': a rotation (orthonormal, determinant +1), last row 0 0 0 1");
+    fail(list, "expected a rigid motion for '" + name +
+                   "': a rotation (orthonormal, determinant +1), last row 0 0 0 1");
   }
   return motion;
 }
@@ -97,7 +102,7 @@ void YamlFile::allow_only(const std::vector<std::string>& keys) const {
 }
 
 bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motion) {
-  constexpr double kTolerance = 1e-3;   // matrices written with 4 or more digits
+  constexpr double kTolerance = 1e-3;  // matrices written with 4 or more digits
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
   if (!matrix.allFinite() || !(rotation.transpose() * rotation).isIdentity(kTolerance)) return false;
   if (rotation.determinant() < 0.0) return false;

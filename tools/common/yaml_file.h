@@ -28,7 +28,8 @@ class YamlFile {
   [[nodiscard]] double number_or(const std::string& key, double fallback) const;
   [[nodiscard]] int integer(const std::string& key) const;
   // A list of finite numbers, of one of the given lengths.
-  [[nodiscard]] std::vector<double> numbers(const std::string& key, const std::vector<std::size_t>& lengths) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& key,
+                                            const std::vector<std::size_t>& lengths) const;
   // 16 numbers by rows into a rigid motion; `name` is for the error.
   [[nodiscard]] slam::SE3 rigid_motion(const YAML::Node& list, const std::string& name) const;
   // Fails for a key that is none of these.

@@ -58,14 +58,17 @@ std::vector<double> true_path_lengths(const std::vector<PosePair>& pairs) {
 }
 
 // What is left of the estimated motion a -> b after the true one is taken away.
-SE3 motion_error(const SE3& truth_a, const SE3& truth_b, const SE3& estimate_a, const SE3& estimate_b, double scale) {
+SE3 motion_error(const SE3& truth_a, const SE3& truth_b, const SE3& estimate_a, const SE3& estimate_b,
+                 double scale) {
   const SE3 truth = truth_a.inverse() * truth_b;
   SE3 estimate = estimate_a.inverse() * estimate_b;
   estimate.t *= scale;
   return estimate.inverse() * truth;
 }
 
-double rotation_angle_deg(const SE3& motion) { return slam::so3_log(motion.q).norm() * kDegreesPerRadian; }
+double rotation_angle_deg(const SE3& motion) {
+  return slam::so3_log(motion.q).norm() * kDegreesPerRadian;
+}
 
 // Truth at time_s: between its two neighbours where they lie close enough together, else the nearest one.
 std::optional<SE3> truth_at(const std::vector<TimedPose>& truth, double time_s, double tolerance_s) {
@@ -83,7 +86,8 @@ std::optional<SE3> truth_at(const std::vector<TimedPose>& truth, double time_s, 
 }
 
 // Estimates with truth at exactly their times.
-std::vector<PosePair> pair_interpolated(const Trajectory& truth, const Trajectory& estimate, double tolerance_s) {
+std::vector<PosePair> pair_interpolated(const Trajectory& truth, const Trajectory& estimate,
+                                        double tolerance_s) {
   std::vector<PosePair> pairs;
   for (const TimedPose& p : estimate.poses) {
     const std::optional<SE3> T_world_body = truth_at(truth.poses, p.time_s, tolerance_s);
@@ -102,9 +106,12 @@ double median_interval_s(const std::vector<PosePair>& pairs) {
 
 const char* to_string(Alignment alignment) {
   switch (alignment) {
-    case Alignment::kSim3: return "sim3";
-    case Alignment::kSe3: return "se3";
-    case Alignment::kNone: return "none";
+    case Alignment::kSim3:
+      return "sim3";
+    case Alignment::kSe3:
+      return "se3";
+    case Alignment::kNone:
+      return "none";
   }
   return "?";
 }
@@ -126,7 +133,11 @@ std::optional<MapToWorld> align(const std::vector<PosePair>& pairs, Alignment al
   const Eigen::MatrixXd target = positions(pairs, true, planar);
   const bool with_scale = alignment == Alignment::kSim3;
   const Eigen::VectorXd centre = source.rowwise().mean();
-  if ((source.colwise() - centre).squaredNorm() <= 0.0) return std::nullopt;   // neither rotation nor scale is defined
+  if ((source.colwise() - centre).squaredNorm() <= 0.0) {  // neither rotation nor scale is defined
+    MapToWorld moved;
+    moved.S_world_map.t.head(source.rows()) = target.rowwise().mean() - centre;
+    return moved;
+  }
   const Eigen::MatrixXd transform = Eigen::umeyama(source, target, with_scale);
   const Eigen::Index n = transform.rows() - 1;
   const double scale = with_scale ? transform.topLeftCorner(n, n).col(0).norm() : 1.0;
@@ -134,7 +145,8 @@ std::optional<MapToWorld> align(const std::vector<PosePair>& pairs, Alignment al
   return MapToWorld{similarity_of(transform, scale), scale};
 }
 
-std::optional<AbsoluteError> absolute_error(const std::vector<PosePair>& pairs, Alignment alignment, bool planar) {
+std::optional<AbsoluteError> absolute_error(const std::vector<PosePair>& pairs, Alignment alignment,
+                                            bool planar) {
   const std::optional<MapToWorld> map_to_world = align(pairs, alignment, planar);
   if (!map_to_world) return std::nullopt;
   AbsoluteError result;
@@ -167,8 +179,8 @@ std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, do
       if (end == length_m.end()) break;
       const auto last = static_cast<std::size_t>(end - length_m.begin());
       if (pairs[first].map_id != pairs[last].map_id) continue;
-      const SE3 error = motion_error(pairs[first].T_world_body, pairs[last].T_world_body, pairs[first].T_map_body,
-                                     pairs[last].T_map_body, scale);
+      const SE3 error = motion_error(pairs[first].T_world_body, pairs[last].T_world_body,
+                                     pairs[first].T_map_body, pairs[last].T_map_body, scale);
       result.translation_percent += 100.0 * error.t.norm() / segment_m;
       result.rotation_deg_per_m += rotation_angle_deg(error) / segment_m;
       ++result.segments;
@@ -180,8 +192,8 @@ std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, do
   return result;
 }
 
-std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Trajectory& estimate, double scale,
-                                               double tolerance_s) {
+std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Trajectory& estimate,
+                                               double scale, double tolerance_s) {
   if (truth.poses.empty()) return std::nullopt;
   const std::vector<PosePair> pairs = pair_interpolated(truth, estimate, tolerance_s);
   if (pairs.size() < 2) return std::nullopt;
@@ -191,7 +203,8 @@ std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Tr
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     double best_offset_s = half_frame_s;
     std::optional<SE3> one_second;
-    for (std::size_t j = i + 1; j < pairs.size() && pairs[j].time_s - pairs[i].time_s <= 1.0 + half_frame_s; ++j) {
+    for (std::size_t j = i + 1; j < pairs.size() && pairs[j].time_s - pairs[i].time_s <= 1.0 + half_frame_s;
+         ++j) {
       if (pairs[j].map_id != pairs[i].map_id) continue;
       const SE3 error = motion_error(pairs[i].T_world_body, pairs[j].T_world_body, pairs[i].T_map_body,
                                      pairs[j].T_map_body, scale);
@@ -207,7 +220,7 @@ std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Tr
     rotations_deg.push_back(rotation_angle_deg(*one_second));
   }
   result.pairs = rotations_deg.size();
-  result.translation_rmse_m = root_mean_square(translations_m);   // NaN where no pair is a second apart
+  result.translation_rmse_m = root_mean_square(translations_m);  // NaN where no pair is a second apart
   result.rotation_rmse_deg = root_mean_square(rotations_deg);
   return result;
 }

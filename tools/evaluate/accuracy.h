@@ -1,7 +1,8 @@
 // How far an estimated trajectory lies from truth: pairing, alignment, absolute and relative errors.
 //
-// Pairing and absolute error are defined as in the independent check that the tests run beside this code: nearest
-// truth pose within a tolerance, Umeyama alignment (Umeyama 1991) over all paired positions, RMS of what remains.
+// Pairing and absolute error are defined as in the independent check that the tests run beside this code:
+// nearest truth pose within a tolerance, Umeyama alignment (Umeyama 1991) over all paired positions, RMS of
+// what remains.
 #pragma once
 
 #include <cstddef>
@@ -19,58 +20,62 @@ enum class Alignment { kSim3, kSe3, kNone };
 inline constexpr double kPairingTolerance_s = 0.02;
 
 struct PosePair {
-  double time_s = 0.0;         // of the estimate
-  slam::SE3 T_world_body;      // truth nearest in time
-  slam::SE3 T_map_body;        // estimate
+  double time_s = 0.0;     // of the estimate
+  slam::SE3 T_world_body;  // truth nearest in time
+  slam::SE3 T_map_body;    // estimate
   std::int32_t map_id = 0;
 };
 
-// One pair for each estimate that has a truth pose at most tolerance_s away; of two equally near ones the later.
+// One pair for each estimate that has a truth pose at most tolerance_s away; of two equally near ones the
+// later.
 [[nodiscard]] std::vector<PosePair> pair_nearest(const Trajectory& truth, const Trajectory& estimate,
                                                  double tolerance_s = kPairingTolerance_s);
 
 // The similarity that carries map coordinates into the world's: p_world = scale * R * p_map + t.
 struct MapToWorld {
   slam::Sim3 S_world_map;
-  double scale = 1.0;          // of S_world_map; 1 for se3 and none
+  double scale = 1.0;  // of S_world_map; 1 for se3 and none
 };
 
-// Least squares over all pairs (Umeyama). planar: only x and y count, and S_world_map is a plane's similarity with
-// z passed through (times scale). Nothing where there are fewer than three pairs or the estimate stands in one point.
-[[nodiscard]] std::optional<MapToWorld> align(const std::vector<PosePair>& pairs, Alignment alignment, bool planar);
+// Least squares over all pairs (Umeyama). planar: only x and y count, and S_world_map is a plane's similarity
+// with z passed through (times scale). An estimate that stands in one point is moved only (scale 1). Nothing
+// where there are fewer than three pairs or where truth stands in one point and a scale was asked for.
+[[nodiscard]] std::optional<MapToWorld> align(const std::vector<PosePair>& pairs, Alignment alignment,
+                                              bool planar);
 
 struct AbsoluteError {
-  std::size_t n = 0;           // pairs
-  double path_m = 0.0;         // length of the truth through the paired poses
+  std::size_t n = 0;    // pairs
+  double path_m = 0.0;  // length of the truth through the paired poses
   double scale = 1.0;
   double rmse_m = 0.0, median_m = 0.0, max_m = 0.0;
-  double percent = 0.0;        // rmse of the path
+  double percent = 0.0;  // rmse of the path
   MapToWorld map_to_world;
 };
-[[nodiscard]] std::optional<AbsoluteError> absolute_error(const std::vector<PosePair>& pairs, Alignment alignment,
-                                                          bool planar);
+[[nodiscard]] std::optional<AbsoluteError> absolute_error(const std::vector<PosePair>& pairs,
+                                                          Alignment alignment, bool planar);
 
-// Relative errors over segments of 100, 200, .. 800 m of the true path, begun every tenth pair (KITTI's odometry
-// measure): the mean over all segments of all lengths.
+// Relative errors over segments of 100, 200, .. 800 m of the true path, begun every tenth pair (KITTI's
+// odometry measure): the mean over all segments of all lengths.
 struct SegmentError {
   std::size_t segments = 0;
   double translation_percent = 0.0;
   double rotation_deg_per_m = 0.0;
 };
-// `scale`: the alignment's, applied to the estimate's translations. Nothing where the path is shorter than 100 m.
+// `scale`: the alignment's, applied to the estimate's translations. Nothing where the path is shorter than
+// 100 m.
 [[nodiscard]] std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, double scale);
 
 // Relative errors over one second. Truth is interpolated at the estimate's times (a hand-held camera turns by
 // degrees within the pairing tolerance). Pairs of poses of different maps are no pairs.
 struct OneSecondError {
-  std::size_t pairs = 0;                  // one second apart, to half a frame
+  std::size_t pairs = 0;  // one second apart, to half a frame
   double translation_rmse_m = 0.0;
   double rotation_rmse_deg = 0.0;
-  double rotation_max_deg = 0.0;          // over all pairs at most one second apart, so that every pose is judged
-  double translation_max_m = 0.0;         // the same
+  double rotation_max_deg = 0.0;   // over all pairs at most one second apart, so that every pose is judged
+  double translation_max_m = 0.0;  // the same
 };
-[[nodiscard]] std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Trajectory& estimate,
-                                                             double scale,
+[[nodiscard]] std::optional<OneSecondError> one_second_error(const Trajectory& truth,
+                                                             const Trajectory& estimate, double scale,
                                                              double tolerance_s = kPairingTolerance_s);
 
 }  // namespace farpoint::tools

@@ -18,8 +18,17 @@ using NamedRuns = std::vector<std::pair<std::string, Json>>;
   throw InputError("--expect '" + condition + "': " + why);
 }
 
+// Words, comparisons and factors stand apart whether or not blanks do.
 std::vector<std::string> words_of(const std::string& condition) {
-  std::istringstream stream(condition);
+  std::string spaced;
+  for (std::size_t i = 0; i < condition.size(); ++i) {
+    const bool comparison = std::string_view("<>=").find(condition[i]) != std::string_view::npos;
+    const bool before = i > 0 && std::string_view("<>=").find(condition[i - 1]) != std::string_view::npos;
+    if (comparison != before || condition[i] == '*') spaced += ' ';
+    spaced += condition[i];
+    if (condition[i] == '*') spaced += ' ';
+  }
+  std::istringstream stream(spaced);
   std::vector<std::string> words;
   for (std::string word; stream >> word;) {
     if (word != "*") words.push_back(word);
@@ -64,7 +73,8 @@ double metric_value(const std::string& condition, const std::string& word, const
   const std::string metric = word.substr(named->first.size() + 1);
   const Json* value = find_metric(named->second, metric);
   if (value == nullptr && !lies_in_null_group(named->second, metric)) {
-    fail(condition, "unknown metric '" + metric + "', expected a key of --json such as ate, final.share or tracking_ms.p99");
+    fail(condition, "unknown metric '" + metric +
+                        "', expected a key of --json such as ate, final.share or tracking_ms.p99");
   }
   if (value == nullptr || !value->is_number()) return std::nan("");
   return value->number();
@@ -79,7 +89,8 @@ bool compare(const std::string& condition, double left, const std::string& op, d
   fail(condition, "unknown comparison '" + op + "', expected <, <=, >, >= or ==");
 }
 
-double right_hand_value(const std::string& condition, const std::vector<std::string>& words, const NamedRuns& runs) {
+double right_hand_value(const std::string& condition, const std::vector<std::string>& words,
+                        const NamedRuns& runs) {
   const std::optional<double> number = to_number(words[2]);
   if (words.size() == 3) return number ? *number : metric_value(condition, words[2], runs);
   if (!number) fail(condition, "expected a number as factor, found '" + words[2] + "'");
@@ -95,7 +106,7 @@ ExpectationResult check_expectation(const std::string& condition, const NamedRun
   }
   const double left = metric_value(condition, words[0], runs);
   const double right = right_hand_value(condition, words, runs);
-  const bool holds = compare(condition, left, words[1], right);   // false where either is NaN
+  const bool holds = compare(condition, left, words[1], right);  // false where either is NaN
   char values[96];
   std::snprintf(values, sizeof values, " (%.6g %s %.6g)", left, words[1].c_str(), right);
   return {holds, condition + values};

@@ -1,4 +1,5 @@
-// Conditions on evaluated runs, for tests and CI: `NAME.METRIC OP [FACTOR] NAME.METRIC` or `NAME.METRIC OP NUMBER`.
+// Conditions on evaluated runs, for tests and CI: `NAME.METRIC OP [FACTOR] NAME.METRIC` or `NAME.METRIC OP
+// NUMBER`.
 //
 //   NAME     a run's file stem
 //   METRIC   a key of --json by its dotted path (final.ate_rmse_m, tracking_ms.p99), or of `final` without it
@@ -18,11 +19,11 @@ namespace farpoint::tools {
 
 struct ExpectationResult {
   bool holds = false;
-  std::string text;   // the condition with the values put in
+  std::string text;  // the condition with the values put in
 };
 
-// runs: name and to_json() of each. Throws InputError where the condition is malformed or names an unknown run or
-// metric.
+// runs: name and to_json() of each. Throws InputError where the condition is malformed or names an unknown
+// run or metric.
 [[nodiscard]] ExpectationResult check_expectation(const std::string& condition,
                                                   const std::vector<std::pair<std::string, Json>>& runs);
 

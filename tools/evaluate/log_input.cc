@@ -15,7 +15,8 @@ namespace {
 slam::SE3 to_pose(const double position[3], const double orientation_wxyz[4]) {
   slam::SE3 pose;
   pose.t = {position[0], position[1], position[2]};
-  const Eigen::Quaterniond q(orientation_wxyz[0], orientation_wxyz[1], orientation_wxyz[2], orientation_wxyz[3]);
+  const Eigen::Quaterniond q(orientation_wxyz[0], orientation_wxyz[1], orientation_wxyz[2],
+                             orientation_wxyz[3]);
   if (q.norm() > 0.0) pose.q = q.normalized();
   return pose;
 }
@@ -40,10 +41,12 @@ std::unique_ptr<ipc::LogReader> open_log(const std::filesystem::path& file) {
   }
 }
 
-void report_damage(const std::filesystem::path& file, const ipc::LogDamage& damage, std::uint64_t undecodable) {
+void report_damage(const std::filesystem::path& file, const ipc::LogDamage& damage,
+                   std::uint64_t undecodable) {
   if (damage.places > 0) {
     std::fprintf(stderr, "farpoint: warning: %s: damaged in %llu places, %llu bytes skipped\n", file.c_str(),
-                 static_cast<unsigned long long>(damage.places), static_cast<unsigned long long>(damage.bytes));
+                 static_cast<unsigned long long>(damage.places),
+                 static_cast<unsigned long long>(damage.bytes));
   }
   if (!damage.read_error.empty()) throw RunError(file.string() + ": cannot be read: " + damage.read_error);
   if (undecodable > 0) {
@@ -175,8 +178,8 @@ auto collect(const std::filesystem::path& file) {
   while (reader->next(&event)) {
     if (!collector.add(event)) ++undecodable;
   }
-  report_damage(file, reader->damage(), undecodable);
   if (reader->events() == 0) throw InputError(file.string() + ": no events, expected an LCM log");
+  report_damage(file, reader->damage(), undecodable);
   return collector.finish();
 }
 
@@ -189,7 +192,8 @@ bool is_lcm_log(const std::filesystem::path& file) {
   }
   unsigned char head[4] = {};
   stream.read(reinterpret_cast<char*>(head), sizeof head);
-  const std::uint32_t word = static_cast<std::uint32_t>(head[0]) << 24 | static_cast<std::uint32_t>(head[1]) << 16 |
+  const std::uint32_t word = static_cast<std::uint32_t>(head[0]) << 24 |
+                             static_cast<std::uint32_t>(head[1]) << 16 |
                              static_cast<std::uint32_t>(head[2]) << 8 | head[3];
   return word == ipc::LogReader::kSyncWord || file.extension() == ".lcm";
 }
@@ -199,7 +203,9 @@ slam::SE3 RecordingLog::T_body_camera0() const {
   return to_pose(calibration->cameras[0].position, calibration->cameras[0].orientation);
 }
 
-RecordingLog read_recording_log(const std::filesystem::path& file) { return collect<RecordingCollector>(file); }
+RecordingLog read_recording_log(const std::filesystem::path& file) {
+  return collect<RecordingCollector>(file);
+}
 
 RunLog read_run_log(const std::filesystem::path& file) {
   RunLog log = collect<RunCollector>(file);

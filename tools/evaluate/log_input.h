@@ -12,31 +12,32 @@
 
 namespace farpoint::tools {
 
-// True for an LCM log (by its first bytes, or by the ending .lcm where they are damaged); a text file elsewhere.
-// Throws InputError where the file cannot be read.
+// True for an LCM log (by its first bytes, or by the ending .lcm where they are damaged); a text file
+// elsewhere. Throws InputError where the file cannot be read.
 [[nodiscard]] bool is_lcm_log(const std::filesystem::path& file);
 
 struct RecordingLog {
-  std::optional<calibration_t> calibration;     // the first one
-  Trajectory truth;                             // T_world_body, ascending; may be empty
-  std::vector<std::int64_t> frame_utimes;       // of CAMERA_0, ascending
+  std::optional<calibration_t> calibration;  // the first one
+  Trajectory truth;                          // T_world_body, ascending; may be empty
+  std::vector<std::int64_t> frame_utimes;    // of CAMERA_0, ascending
 
   // T_body_camera of camera 0; identity where the log has no calibration.
   [[nodiscard]] slam::SE3 T_body_camera0() const;
 };
-// Throws InputError where the file cannot be read. Damage is skipped and reported in one line on standard error.
+// Throws InputError where the file cannot be read. Damage is skipped and reported in one line on standard
+// error.
 [[nodiscard]] RecordingLog read_recording_log(const std::filesystem::path& file);
 
 struct RunLog {
-  Trajectory final_trajectory;     // the map with most frames, after the last optimisation
-  Trajectory live_trajectory;      // poses published as valid, map frame, every map
-  bool has_trajectory = false;     // a FARPOINT_TRAJECTORY was there (farpointd ended in order)
-  bool has_poses = false;          // at least one FARPOINT_POSE, valid or not
-  std::int64_t frames = 0;         // of the recording, as far as the run tells
-  std::int8_t scale_state = 0;     // status_t.SCALE_*
-  std::int32_t resets = 0;         // highest reset counter published
+  Trajectory final_trajectory;  // the map with most frames, after the last optimisation
+  Trajectory live_trajectory;   // poses published as valid, map frame, every map
+  bool has_trajectory = false;  // a FARPOINT_TRAJECTORY was there (farpointd ended in order)
+  bool has_poses = false;       // at least one FARPOINT_POSE, valid or not
+  std::int64_t frames = 0;      // of the recording, as far as the run tells
+  std::int8_t scale_state = 0;  // status_t.SCALE_*
+  std::int32_t resets = 0;      // highest reset counter published
   std::optional<summary_t> summary;
-  std::vector<double> tracking_ms; // thread CPU time of each frame's tracking
+  std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
   std::int64_t deadline_misses = 0;
 };
 // Throws InputError where the file cannot be read or holds neither FARPOINT_TRAJECTORY nor FARPOINT_POSE.

@@ -14,12 +14,16 @@ namespace {
 constexpr double kMaxRelativeDepthSigma = 0.30;
 
 const char* scale_state_name(const Run& run) {
-  if (!run.log) return "not in the file";
+  if (!run.log) return "not told by a text file";
   switch (run.log->scale_state) {
-    case status_t::SCALE_UNKNOWN: return "unknown";
-    case status_t::SCALE_ASSUMED: return "assumed";
-    case status_t::SCALE_METRIC: return "metric";
-    default: return "?";
+    case status_t::SCALE_UNKNOWN:
+      return "unknown";
+    case status_t::SCALE_ASSUMED:
+      return "assumed";
+    case status_t::SCALE_METRIC:
+      return "metric";
+    default:
+      return "?";
   }
 }
 
@@ -35,7 +39,8 @@ bool compare_at_camera0(const Run& run, const Truth& truth, const EvaluationOpti
     return truth.names_body && truth.body.has_orientation && !scale_is_metric(run, options);
   }
   if (!truth.names_body) {
-    throw InputError("--truth-point camera0: needs a truth log whose CALIBRATION says where camera 0 stands on the body");
+    throw InputError(
+        "--truth-point camera0: needs a truth log whose CALIBRATION says where camera 0 stands on the body");
   }
   if (!truth.body.has_orientation) {
     throw InputError("--truth-point camera0: the truth has positions only, expected one with orientation");
@@ -50,17 +55,18 @@ std::int64_t count_frames(const Run& run, const Truth& truth, const EvaluationOp
   return static_cast<std::int64_t>(run.final_trajectory.poses.size());
 }
 
-TrajectoryMetrics measure(const Trajectory& truth, const Trajectory& estimate, Alignment alignment, bool planar,
-                          std::int64_t frames) {
+TrajectoryMetrics measure(const Trajectory& truth, const Trajectory& estimate, Alignment alignment,
+                          bool planar, std::int64_t frames) {
   TrajectoryMetrics metrics;
   const std::vector<PosePair> pairs = pair_nearest(truth, estimate);
   metrics.poses = estimate.poses.size();
   metrics.paired = pairs.size();
   if (frames > 0) metrics.share = static_cast<double>(pairs.size()) / static_cast<double>(frames);
   metrics.absolute = absolute_error(pairs, alignment, planar);
-  if (metrics.absolute && truth.has_orientation && estimate.has_orientation) {
-    metrics.segments = segment_error(pairs, metrics.absolute->scale);
-    metrics.one_second = one_second_error(truth, estimate, metrics.absolute->scale);
+  if (truth.has_orientation && estimate.has_orientation) {
+    const double scale = metrics.absolute ? metrics.absolute->scale : 1.0;
+    metrics.segments = segment_error(pairs, scale);
+    metrics.one_second = one_second_error(truth, estimate, scale);
   }
   return metrics;
 }
@@ -71,13 +77,14 @@ Spread spread_of(const std::vector<double>& values) {
 
 double percent_over(const std::vector<double>& values, double limit) {
   const auto over = std::count_if(values.begin(), values.end(), [limit](double v) { return v > limit; });
-  return 100.0 * static_cast<double>(over) / static_cast<double>(values.size());   // 0/0: NaN
+  return 100.0 * static_cast<double>(over) / static_cast<double>(values.size());  // 0/0: NaN
 }
 
 DepthMetrics depth_metrics(const map_summary_t& map, double scale) {
   std::vector<double> depths_m;
   for (std::size_t i = 0; i < map.creation_depth.size(); ++i) {
-    if (map.creation_relative_sigma[i] < kMaxRelativeDepthSigma) depths_m.push_back(scale * map.creation_depth[i]);
+    if (map.creation_relative_sigma[i] < kMaxRelativeDepthSigma)
+      depths_m.push_back(scale * map.creation_depth[i]);
   }
   DepthMetrics metrics;
   metrics.triangulation_m = spread_of(depths_m);
@@ -91,12 +98,14 @@ DepthMetrics depth_metrics(const map_summary_t& map, double scale) {
 
 void add_summary(const summary_t& summary, RunMetrics* metrics) {
   if (summary.frames > 0) {
-    metrics->tracked_percent = 100.0 * static_cast<double>(summary.frames_valid) / static_cast<double>(summary.frames);
+    metrics->tracked_percent =
+        100.0 * static_cast<double>(summary.frames_valid) / static_cast<double>(summary.frames);
   }
   metrics->times_lost = summary.times_lost;
   metrics->maps = summary.maps_made;
   if (summary.landmarks_made > 0) {
-    metrics->vmp_percent = 100.0 * static_cast<double>(summary.vmp_promoted) / static_cast<double>(summary.landmarks_made);
+    metrics->vmp_percent =
+        100.0 * static_cast<double>(summary.vmp_promoted) / static_cast<double>(summary.landmarks_made);
   }
   if (summary.maps.empty()) return;
   metrics->map_points = summary.maps[0].landmarks;
@@ -105,7 +114,8 @@ void add_summary(const summary_t& summary, RunMetrics* metrics) {
 }
 
 // Time range of a segment: by the recording's frames where they are known, else by the estimate's own poses.
-std::pair<double, double> segment_times(const FrameRange& range, const Truth& truth, const Trajectory& estimate) {
+std::pair<double, double> segment_times(const FrameRange& range, const Truth& truth,
+                                        const Trajectory& estimate) {
   const bool by_recording = !truth.frame_utimes.empty();
   const std::size_t frames = by_recording ? truth.frame_utimes.size() : estimate.poses.size();
   if (range.from >= range.to || range.to > frames) {
@@ -118,8 +128,8 @@ std::pair<double, double> segment_times(const FrameRange& range, const Truth& tr
   return {time_of(range.from), time_of(range.to - 1)};
 }
 
-std::vector<SegmentScale> segment_scales(const Trajectory& truth_at_point, const Truth& truth, const Trajectory& estimate,
-                                         const EvaluationOptions& options) {
+std::vector<SegmentScale> segment_scales(const Trajectory& truth_at_point, const Truth& truth,
+                                         const Trajectory& estimate, const EvaluationOptions& options) {
   std::vector<SegmentScale> result;
   const std::vector<PosePair> pairs = pair_nearest(truth_at_point, estimate);
   for (const FrameRange& range : options.segments) {
@@ -130,7 +140,8 @@ std::vector<SegmentScale> segment_scales(const Trajectory& truth_at_point, const
       if (pair.time_s >= begin_s && pair.time_s <= end_s) inside.push_back(pair);
     }
     SegmentScale segment{range, inside.size(), std::nullopt, std::nullopt};
-    if (const auto map_to_world = align(inside, Alignment::kSim3, options.planar)) segment.scale = map_to_world->scale;
+    if (const auto map_to_world = align(inside, Alignment::kSim3, options.planar))
+      segment.scale = map_to_world->scale;
     if (segment.scale && !result.empty() && result.front().scale) {
       segment.ratio_to_first = *segment.scale / *result.front().scale;
     }
@@ -146,7 +157,9 @@ Json or_null(const std::optional<T>& value) {
   return value ? Json(*value) : Json();
 }
 
-Json count(std::size_t n) { return static_cast<std::int64_t>(n); }
+Json count(std::size_t n) {
+  return static_cast<std::int64_t>(n);
+}
 
 Json to_json(const TrajectoryMetrics& metrics) {
   Json json = Json::object();

@@ -1,10 +1,10 @@
 // One run against truth: METHOD.md's row and more.
 //
-// Definitions. final: every frame's pose in the map with most frames, after the last optimisation. live: the map-frame
-// poses that were published as valid. share: poses with truth, of all frames of the recording. Triangulation depth:
-// distance from the newest observing keyframe to the point when it was made; observation distance: camera to point,
-// over all observations of the final map; both in metres by the final alignment's scale, depths only of points that
-// survived and whose relative depth sigma was under 30 %.
+// Definitions. final: every frame's pose in the map with most frames, after the last optimisation. live: the
+// map-frame poses that were published as valid. share: poses with truth, of all frames of the recording.
+// Triangulation depth: distance from the newest observing keyframe to the point when it was made; observation
+// distance: camera to point, over all observations of the final map; both in metres by the final alignment's
+// scale, depths only of points that survived and whose relative depth sigma was under 30 %.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ namespace farpoint::tools {
 
 // Which point of the vehicle is compared with truth.
 enum class TruthPoint {
-  kAuto,      // camera 0 where the run's scale is unknown (its body then stands there), else the body
+  kAuto,  // camera 0 where the run's scale is unknown (its body then stands there), else the body
   kBody,
   kCamera0,
 };
@@ -32,37 +32,38 @@ struct FrameRange {
 };
 
 struct EvaluationOptions {
-  std::optional<Alignment> alignment;      // nothing: se3 for a run of metric scale, else sim3
+  std::optional<Alignment> alignment;  // nothing: se3 for a run of metric scale, else sim3
   bool planar = false;
   TruthPoint truth_point = TruthPoint::kAuto;
-  std::optional<std::int64_t> frames;      // of the recording; nothing: from the truth's log, else from the run
-  std::vector<FrameRange> segments;        // of the final trajectory, each aligned by itself
+  std::optional<std::int64_t> frames;  // of the recording; nothing: from the truth's log, else from the run
+  std::vector<FrameRange> segments;    // of the final trajectory, each aligned by itself
 };
 
 struct Truth {
-  Trajectory body;                          // T_world_body
-  slam::SE3 T_body_camera0;                 // identity where the truth is a text file
-  bool names_body = false;                  // a lever arm is known: camera 0 is not the body
-  std::vector<std::int64_t> frame_utimes;   // of CAMERA_0; empty where the truth is a text file
+  Trajectory body;                         // T_world_body
+  slam::SE3 T_body_camera0;                // identity where the truth is a text file
+  bool names_body = false;                 // a lever arm is known: camera 0 is not the body
+  std::vector<std::int64_t> frame_utimes;  // of CAMERA_0; empty where the truth is a text file
 };
-// Reads truth from a recording's log or a TUM file. Throws InputError, also where there is no truth in the log.
+// Reads truth from a recording's log or a TUM file. Throws InputError, also where there is no truth in the
+// log.
 [[nodiscard]] Truth read_truth(const std::filesystem::path& file);
 
 // A run as given on the command line.
 struct Run {
-  std::string name;                         // stem of the file
-  std::optional<RunLog> log;                // nothing: the file is a TUM trajectory
+  std::string name;           // stem of the file
+  std::optional<RunLog> log;  // nothing: the file is a TUM trajectory
   Trajectory final_trajectory;
 };
 [[nodiscard]] Run read_run(const std::filesystem::path& file);
 
 struct TrajectoryMetrics {
-  std::size_t poses = 0;                    // of the estimate
-  std::size_t paired = 0;                   // of them, with truth
+  std::size_t poses = 0;   // of the estimate
+  std::size_t paired = 0;  // of them, with truth
   double share = 0.0;
-  std::optional<AbsoluteError> absolute;    // nothing: fewer than three pairs: lost
-  std::optional<SegmentError> segments;     // nothing: path under 100 m, or truth of position only
-  std::optional<OneSecondError> one_second; // nothing: truth of position only
+  std::optional<AbsoluteError> absolute;     // nothing: fewer than three pairs: lost
+  std::optional<SegmentError> segments;      // nothing: path under 100 m, or truth of position only
+  std::optional<OneSecondError> one_second;  // nothing: truth of position only
 };
 
 struct Spread {
@@ -72,14 +73,14 @@ struct Spread {
 
 struct DepthMetrics {
   Spread triangulation_m;
-  double over_50_m_percent = 0.0, over_100_m_percent = 0.0;   // of the triangulation depths
+  double over_50_m_percent = 0.0, over_100_m_percent = 0.0;  // of the triangulation depths
   Spread observation_m;
 };
 
 struct SegmentScale {
   FrameRange range;
   std::size_t paired = 0;
-  std::optional<double> scale;              // metres a map unit, from this segment alone
+  std::optional<double> scale;  // metres a map unit, from this segment alone
   std::optional<double> ratio_to_first;
 };
 
@@ -88,25 +89,26 @@ struct RunMetrics {
   Alignment alignment = Alignment::kSim3;
   bool planar = false;
   const char* truth_point = "body";
-  const char* scale_state = "not in the file";
-  std::int64_t images = 0;                  // frames of the recording
+  const char* scale_state = "not told by a text file";
+  std::int64_t images = 0;  // frames of the recording
   TrajectoryMetrics final_metrics;
-  std::optional<TrajectoryMetrics> live_metrics;   // nothing: the run is a TUM file
+  std::optional<TrajectoryMetrics> live_metrics;  // nothing: the run is a TUM file
   std::vector<SegmentScale> segments;
 
   // From an output log only.
-  std::optional<double> tracked_percent;    // frames published with a valid pose
+  std::optional<double> tracked_percent;  // frames published with a valid pose
   std::optional<std::int64_t> resets, times_lost, maps;
   std::vector<double> tracking_ms;
   std::optional<std::int64_t> deadline_misses;
   std::optional<DepthMetrics> depth;
   std::optional<std::int64_t> map_points;
-  std::optional<double> vmp_percent;        // points made through a virtual map point, of all points made
+  std::optional<double> vmp_percent;  // points made through a virtual map point, of all points made
 };
 
 [[nodiscard]] RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options);
 
-// Every figure by name; absent ones are null. Key names of the absolute error are those of the field's scripts.
+// Every figure by name; absent ones are null. Key names of the absolute error are those of the field's
+// scripts.
 [[nodiscard]] Json to_json(const RunMetrics& metrics);
 
 }  // namespace farpoint::tools

@@ -19,7 +19,7 @@ double percentile(std::vector<double> values, double percent) {
 double mean(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());   // 0/0: NaN
+  return sum / static_cast<double>(values.size());  // 0/0: NaN
 }
 
 double root_mean_square(const std::vector<double>& values) {

@@ -34,11 +34,11 @@ std::string spread_text(const std::optional<DepthMetrics>& depth, Spread DepthMe
 // The same keys and digits as the independent check, then the relative errors.
 std::string trajectory_text(const TrajectoryMetrics& metrics) {
   std::string text = "n=" + std::to_string(metrics.paired) + " share=" + decimal(metrics.share, 4);
-  if (!metrics.absolute) return text + " lost: fewer than 3 different poses have truth";
+  if (!metrics.absolute) return text + " lost: fewer than 3 poses can be compared with truth";
   const AbsoluteError& a = *metrics.absolute;
-  text += " path_m=" + decimal(a.path_m, 2) + " scale=" + decimal(a.scale, 5) + " ate_rmse_m=" + decimal(a.rmse_m, 4) +
-          " ate_median_m=" + decimal(a.median_m, 4) + " ate_max_m=" + decimal(a.max_m, 4) +
-          " ate_percent=" + decimal(a.percent, 3);
+  text += " path_m=" + decimal(a.path_m, 2) + " scale=" + decimal(a.scale, 5) +
+          " ate_rmse_m=" + decimal(a.rmse_m, 4) + " ate_median_m=" + decimal(a.median_m, 4) +
+          " ate_max_m=" + decimal(a.max_m, 4) + " ate_percent=" + decimal(a.percent, 3);
   if (metrics.segments) {
     text += " rpe_translation_percent=" + decimal(metrics.segments->translation_percent, 3) +
             " rpe_rotation_deg_per_m=" + decimal(metrics.segments->rotation_deg_per_m, 5);
@@ -127,9 +127,9 @@ Row row_of(const RunMetrics& m) {
 }  // namespace
 
 std::string details_text(const RunMetrics& metrics) {
-  std::string text = metrics.name + " truth: compared at the " + metrics.truth_point + ", scale of the run " +
-                     metrics.scale_state + ", aligned by " + to_string(metrics.alignment) +
-                     (metrics.planar ? ", x and y only" : "") + "\n";
+  std::string text = metrics.name + " truth: compared at the " + metrics.truth_point +
+                     ", scale of the run: " + metrics.scale_state + ", aligned by " +
+                     to_string(metrics.alignment) + (metrics.planar ? ", x and y only" : "") + "\n";
   text += metrics.name + " final: " + trajectory_text(metrics.final_metrics) + "\n";
   if (metrics.live_metrics) text += metrics.name + " live:  " + trajectory_text(*metrics.live_metrics) + "\n";
   if (metrics.depth) {
@@ -139,9 +139,11 @@ std::string details_text(const RunMetrics& metrics) {
             " observations=" + std::to_string(metrics.depth->observation_m.count) + "\n";
   }
   if (metrics.times_lost) {
-    text += metrics.name + " maps: made=" + integer(metrics.maps) + " times_lost=" + integer(metrics.times_lost) + "\n";
+    text += metrics.name + " maps: made=" + integer(metrics.maps) +
+            " times_lost=" + integer(metrics.times_lost) + "\n";
   }
-  for (const SegmentScale& segment : metrics.segments) text += metrics.name + " " + segment_text(segment) + "\n";
+  for (const SegmentScale& segment : metrics.segments)
+    text += metrics.name + " " + segment_text(segment) + "\n";
   return text;
 }
 
@@ -158,8 +160,9 @@ std::string table_text(const std::vector<RunMetrics>& runs) {
   }
   std::string text;
   for (const Row& row : rows) {
-    text += row[0] + std::string(width[0] - row[0].size(), ' ');   // names to the left, figures to the right
-    for (std::size_t c = 1; c < row.size(); ++c) text += "  " + std::string(width[c] - row[c].size(), ' ') + row[c];
+    text += row[0] + std::string(width[0] - row[0].size(), ' ');  // names to the left, figures to the right
+    for (std::size_t c = 1; c < row.size(); ++c)
+      text += "  " + std::string(width[c] - row[c].size(), ' ') + row[c];
     text += "\n";
   }
   return text;

@@ -6,13 +6,14 @@
 namespace farpoint::tools {
 namespace {
 
-constexpr double kMaxRowTime_s = 1e-3;   // 1 ms a row is half a second an image: certainly another unit
+constexpr double kMaxRowTime_s = 1e-3;  // 1 ms a row is half a second an image: certainly another unit
 
 slam::CameraModel read_model(const YamlFile& yaml) {
   const std::string model = yaml.text("model");
   if (model == "pinhole-radtan") return slam::CameraModel::kPinholeRadtan;
   if (model == "kannala-brandt") return slam::CameraModel::kKannalaBrandt;
-  yaml.fail(yaml.require("model"), "expected model 'pinhole-radtan' or 'kannala-brandt', found '" + model + "'");
+  yaml.fail(yaml.require("model"),
+            "expected model 'pinhole-radtan' or 'kannala-brandt', found '" + model + "'");
 }
 
 }  // namespace
@@ -44,7 +45,8 @@ CameraFile read_camera_file(const std::filesystem::path& file) {
   if (camera.rate_hz < 0.0) yaml.fail(yaml.require("rate_hz"), "expected rate_hz >= 0 (0: unknown)");
   camera.row_time_s = yaml.number_or("row_time_s", -1.0);
   if (camera.row_time_s > kMaxRowTime_s) {
-    yaml.fail(yaml.require("row_time_s"), "expected row_time_s in seconds, at most 0.001 (0: global, negative: unknown)");
+    yaml.fail(yaml.require("row_time_s"),
+              "expected row_time_s in seconds, at most 0.001 (0: global, negative: unknown)");
   }
   return camera;
 }

@@ -1,4 +1,5 @@
-// Camera files (config/cameras/*.yaml): one calibrated camera, every key explained in config/cameras/README.md.
+// Camera files (config/cameras/*.yaml): one calibrated camera, every key explained in
+// config/cameras/README.md.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +12,9 @@ namespace farpoint::tools {
 
 struct CameraFile {
   slam::Camera::Parameters parameters;
-  std::optional<slam::SE3> T_body_camera;   // nothing: the file names no body
-  double rate_hz = 0.0;                     // nominal; 0 unknown
-  double row_time_s = -1.0;                 // rolling shutter: one row to the next; 0 global; negative unknown
+  std::optional<slam::SE3> T_body_camera;  // nothing: the file names no body
+  double rate_hz = 0.0;                    // nominal; 0 unknown
+  double row_time_s = -1.0;                // rolling shutter: one row to the next; 0 global; negative unknown
 };
 
 // Throws InputError naming file, line, key and what was expected.

@@ -25,13 +25,15 @@ RecordingCamera read_camera(const fs::path& folder) {
   camera.name = folder.filename().string();
   camera.T_body_camera = read_extrinsics(yaml);
   camera.rate_hz = yaml.number_or("rate_hz", 0.0);
-  if (yaml.text("camera_model") != "pinhole") yaml.fail(yaml.require("camera_model"), "expected camera_model 'pinhole'");
+  if (yaml.text("camera_model") != "pinhole")
+    yaml.fail(yaml.require("camera_model"), "expected camera_model 'pinhole'");
 
   const std::string distortion_model = yaml.text("distortion_model");
   const bool equidistant = distortion_model == "equidistant";
   if (!equidistant && distortion_model != "radial-tangential") {
-    yaml.fail(yaml.require("distortion_model"), "expected distortion_model 'radial-tangential' or 'equidistant', found '" +
-                                                    distortion_model + "'");
+    yaml.fail(
+        yaml.require("distortion_model"),
+        "expected distortion_model 'radial-tangential' or 'equidistant', found '" + distortion_model + "'");
   }
   slam::Camera::Parameters& p = camera.parameters;
   p.model = equidistant ? slam::CameraModel::kKannalaBrandt : slam::CameraModel::kPinholeRadtan;
@@ -43,8 +45,8 @@ RecordingCamera read_camera(const fs::path& folder) {
   p.fy_px = intrinsics[1];
   p.cx_px = intrinsics[2];
   p.cy_px = intrinsics[3];
-  const std::vector<double> distortion =
-      yaml.numbers("distortion_coefficients", equidistant ? std::vector<std::size_t>{4} : std::vector<std::size_t>{4, 5});
+  const std::vector<double> distortion = yaml.numbers(
+      "distortion_coefficients", equidistant ? std::vector<std::size_t>{4} : std::vector<std::size_t>{4, 5});
   std::copy(distortion.begin(), distortion.end(), p.distortion.begin());
   return camera;
 }
@@ -64,7 +66,8 @@ ImuCalibration read_imu_calibration(const fs::path& folder) {
 // Time of a CSV line, checked to lie after the last one's.
 std::int64_t next_utime(const FieldLine& line, std::int64_t last_utime) {
   const std::int64_t utime = line.utime_from_nanoseconds_at(0, "the timestamp [ns]");
-  if (utime <= last_utime) line.fail("expected a timestamp after the one above, found " + std::string(line.text(0)));
+  if (utime <= last_utime)
+    line.fail("expected a timestamp after the one above, found " + std::string(line.text(0)));
   return utime;
 }
 
@@ -143,7 +146,8 @@ void read_truth(const fs::path& file, Recording* recording) {
 fs::path find_mav0(const fs::path& root) {
   if (fs::is_directory(root / "mav0" / "cam0")) return root / "mav0";
   if (fs::is_directory(root / "cam0")) return root;
-  throw InputError(root.string() + ": expected an EuRoC recording: a folder that holds mav0/cam0, or mav0 itself");
+  throw InputError(root.string() +
+                   ": expected an EuRoC recording: a folder that holds mav0/cam0, or mav0 itself");
 }
 
 }  // namespace
@@ -155,10 +159,11 @@ Recording read_euroc(const fs::path& root) {
   std::vector<std::map<std::int64_t, fs::path>> images;
   for (const char* name : {"cam0", "cam1"}) {
     const fs::path folder = mav0 / name;
-    if (!fs::is_directory(folder)) break;   // monocular
+    if (!fs::is_directory(folder)) break;  // monocular
     std::map<std::int64_t, fs::path> list = read_image_list(folder, &recording.missing_images);
     if (list.empty() && images.empty()) {
-      throw InputError((folder / "data.csv").string() + ": none of its images exists in " + (folder / "data").string());
+      throw InputError((folder / "data.csv").string() + ": none of its images exists in " +
+                       (folder / "data").string());
     }
     if (list.empty()) break;
     images.push_back(std::move(list));

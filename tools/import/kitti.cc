@@ -28,7 +28,8 @@ std::map<std::int64_t, fs::path> list_images(const fs::path& folder) {
     std::int64_t number = -1;
     const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
     if (error != std::errc() || end != stem.data() + stem.size() || number < 0) {
-      throw InputError(entry.path().string() + ": expected an image named by its number, like 000000" + extension);
+      throw InputError(entry.path().string() + ": expected an image named by its number, like 000000" +
+                       extension);
     }
     if (!images.emplace(number, entry.path()).second) {
       throw InputError(entry.path().string() + ": a second image of number " + std::to_string(number));
@@ -40,9 +41,10 @@ std::map<std::int64_t, fs::path> list_images(const fs::path& folder) {
 Projection read_projection(const FieldLine& line) {
   line.require_fields(13, kProjectionLayout);
   Projection p;
-  for (int i = 0; i < 12; ++i) p(i / 4, i % 4) = line.number_at(static_cast<std::size_t>(i) + 1, "the projection");
-  const bool rectified = p(0, 1) == 0.0 && p(1, 0) == 0.0 && p(2, 0) == 0.0 && p(2, 1) == 0.0 && p(2, 2) == 1.0 &&
-                         p(0, 0) > 0.0 && p(1, 1) > 0.0;
+  for (int i = 0; i < 12; ++i)
+    p(i / 4, i % 4) = line.number_at(static_cast<std::size_t>(i) + 1, "the projection");
+  const bool rectified = p(0, 1) == 0.0 && p(1, 0) == 0.0 && p(2, 0) == 0.0 && p(2, 1) == 0.0 &&
+                         p(2, 2) == 1.0 && p(0, 0) > 0.0 && p(1, 1) > 0.0;
   if (!rectified) line.fail("expected the projection of a rectified camera: fx 0 cx . / 0 fy cy . / 0 0 1 .");
   return p;
 }
@@ -58,7 +60,9 @@ std::map<std::string, Projection> read_projections(const fs::path& file) {
 }
 
 // Where a rectified camera stands in the axes that all projections share: p_camera = p + K^-1 P.col(3).
-Eigen::Vector3d camera_centre(const Projection& p) { return -p.leftCols<3>().inverse() * p.col(3); }
+Eigen::Vector3d camera_centre(const Projection& p) {
+  return -p.leftCols<3>().inverse() * p.col(3);
+}
 
 RecordingCamera make_camera(const std::string& name, const Projection& p, const Projection& p0) {
   RecordingCamera camera;
@@ -140,9 +144,11 @@ void read_poses(const fs::path& file, const std::vector<std::int64_t>& utimes, R
     const FieldLine& line = text.lines()[i];
     line.require_fields(12, "a 3x4 pose matrix by rows");
     Projection matrix;
-    for (int k = 0; k < 12; ++k) matrix(k / 4, k % 4) = line.number_at(static_cast<std::size_t>(k), "the pose");
+    for (int k = 0; k < 12; ++k)
+      matrix(k / 4, k % 4) = line.number_at(static_cast<std::size_t>(k), "the pose");
     slam::SE3 T_world_camera;
-    if (!to_rigid_motion(matrix, &T_world_camera)) line.fail("expected a rotation (orthonormal, determinant +1) in the pose");
+    if (!to_rigid_motion(matrix, &T_world_camera))
+      line.fail("expected a rotation (orthonormal, determinant +1) in the pose");
     recording->truth.push_back({utimes[i], T_world_camera * T_camera_body});
   }
 }
@@ -169,7 +175,8 @@ Recording read_kitti(const fs::path& root, const std::string& sequence) {
   if (!fs::is_directory(folder)) {
     throw InputError(folder.string() + ": no such folder, expected DIR/sequences/SEQUENCE");
   }
-  if (!fs::is_directory(folder / "image_0")) throw InputError((folder / "image_0").string() + ": no such folder");
+  if (!fs::is_directory(folder / "image_0"))
+    throw InputError((folder / "image_0").string() + ": no such folder");
 
   std::vector<std::map<std::int64_t, fs::path>> images{list_images(folder / "image_0")};
   if (images[0].empty()) throw InputError((folder / "image_0").string() + ": no PNG or JPEG images");

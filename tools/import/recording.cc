@@ -14,7 +14,7 @@ namespace {
 const RecordingImage& first_image_of(const Recording& recording, int camera) {
   const auto found = std::find_if(recording.images.begin(), recording.images.end(),
                                   [camera](const RecordingImage& image) { return image.camera == camera; });
-  return *found;   // the importers drop cameras without an image
+  return *found;  // the importers drop cameras without an image
 }
 
 double median_rate_hz(const Recording& recording, int camera) {
@@ -33,7 +33,8 @@ double median_rate_hz(const Recording& recording, int camera) {
 ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file) {
   const std::span data(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   const std::optional<ipc::ImageInfo> info = ipc::probe_image(data);
-  if (!info) throw InputError(file.string() + ": expected a PNG or JPEG image, found neither or a damaged one");
+  if (!info)
+    throw InputError(file.string() + ": expected a PNG or JPEG image, found neither or a damaged one");
   return *info;
 }
 
@@ -54,7 +55,8 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
       camera.parameters.height_px = info.height_px;
     }
     const std::string complaint = slam::Camera::check(camera.parameters);
-    if (!complaint.empty()) throw InputError(calibration.string() + ": camera " + camera.name + ": " + complaint);
+    if (!complaint.empty())
+      throw InputError(calibration.string() + ": camera " + camera.name + ": " + complaint);
     if (camera.rate_hz == 0.0) camera.rate_hz = median_rate_hz(*recording, index);
   }
 }

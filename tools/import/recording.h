@@ -1,5 +1,5 @@
-// A recording of a public data set, as its importer found it: who saw what when. Image bytes stay in their files
-// until they are copied into the log.
+// A recording of a public data set, as its importer found it: who saw what when. Image bytes stay in their
+// files until they are copied into the log.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ struct RecordingCamera {
   std::string name;
   slam::Camera::Parameters parameters;
   slam::SE3 T_body_camera;
-  double rate_hz = 0.0;          // nominal; 0 unknown
-  double row_time_s = 0.0;       // rolling shutter: one row to the next; 0 global; negative unknown
+  double rate_hz = 0.0;     // nominal; 0 unknown
+  double row_time_s = 0.0;  // rolling shutter: one row to the next; 0 global; negative unknown
 };
 
 struct RecordingImage {
   std::int64_t utime = 0;
-  std::int64_t sequence = 0;     // the same for images taken together
+  std::int64_t sequence = 0;  // the same for images taken together
   int camera = 0;
   std::filesystem::path file;
 };
@@ -32,32 +32,32 @@ struct RecordingImage {
 struct RecordingImu {
   std::int64_t utime = 0;
   Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();
-  Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();   // specific force
+  Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();  // specific force
 };
 
 struct ImuCalibration {
   slam::SE3 T_body_imu;
   double rate_hz = 0.0;
-  double gyro_noise_density = 0.0, gyro_random_walk = 0.0;       // rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)
-  double accel_noise_density = 0.0, accel_random_walk = 0.0;     // m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)
+  double gyro_noise_density = 0.0, gyro_random_walk = 0.0;    // rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)
+  double accel_noise_density = 0.0, accel_random_walk = 0.0;  // m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)
 };
 
 struct RecordingTruth {
   std::int64_t utime = 0;
-  slam::SE3 T_world_body;        // world: the data set's own
+  slam::SE3 T_world_body;  // world: the data set's own
 };
 
 struct Recording {
-  // What T_body_camera and the truth refer to; empty where the data set names no body. The body then stands at
-  // camera 0 with axes x forward, y left, z up.
+  // What T_body_camera and the truth refer to; empty where the data set names no body. The body then stands
+  // at camera 0 with axes x forward, y left, z up.
   std::string body_name;
   std::vector<RecordingCamera> cameras;
   std::optional<ImuCalibration> imu_calibration;
-  std::vector<RecordingImage> images;      // ascending in time, camera 0 first where they are taken together
-  std::vector<RecordingImu> imu;           // ascending in time
-  std::vector<RecordingTruth> truth;       // ascending in time
+  std::vector<RecordingImage> images;  // ascending in time, camera 0 first where they are taken together
+  std::vector<RecordingImu> imu;       // ascending in time
+  std::vector<RecordingTruth> truth;   // ascending in time
   bool truth_has_orientation = true;
-  std::size_t missing_images = 0;          // listed, but without a file, or on one side of a stereo pair only
+  std::size_t missing_images = 0;  // listed, but without a file, or on one side of a stereo pair only
 };
 
 // Rotation of a camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
@@ -66,9 +66,9 @@ struct Recording {
 // Format and size from the head of an image file's bytes. Throws InputError naming `file`.
 [[nodiscard]] ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file);
 
-// Sets parameters.width/height from the first image of each camera where they are 0, checks each camera, and fills
-// a rate that is unknown from the median interval of the images. Throws InputError; `calibration` is the file to
-// blame.
+// Sets parameters.width/height from the first image of each camera where they are 0, checks each camera, and
+// fills a rate that is unknown from the median interval of the images. Throws InputError; `calibration` is
+// the file to blame.
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording);
 
 }  // namespace farpoint::tools

@@ -24,7 +24,8 @@ struct Event {
 
 std::vector<Event> events_in_order(const Recording& recording) {
   std::vector<Event> events;
-  for (std::size_t i = 0; i < recording.imu.size(); ++i) events.push_back({recording.imu[i].utime, Kind::kImu, i});
+  for (std::size_t i = 0; i < recording.imu.size(); ++i)
+    events.push_back({recording.imu[i].utime, Kind::kImu, i});
   for (std::size_t i = 0; i < recording.truth.size(); ++i) {
     events.push_back({recording.truth[i].utime, Kind::kTruth, i});
   }
@@ -37,7 +38,9 @@ std::vector<Event> events_in_order(const Recording& recording) {
   return events;
 }
 
-void set_vector(const Eigen::Vector3d& v, double* out) { std::copy(v.data(), v.data() + 3, out); }
+void set_vector(const Eigen::Vector3d& v, double* out) {
+  std::copy(v.data(), v.data() + 3, out);
+}
 
 void set_quaternion(const Eigen::Quaterniond& q, double* out) {
   out[0] = q.w();
@@ -99,7 +102,8 @@ ground_truth_t to_message(const RecordingTruth& truth, bool has_orientation) {
   message.utime = truth.utime;
   set_vector(truth.T_world_body.t, message.position);
   message.has_orientation = has_orientation ? 1 : 0;
-  set_quaternion(has_orientation ? truth.T_world_body.q : Eigen::Quaterniond::Identity(), message.orientation);
+  set_quaternion(has_orientation ? truth.T_world_body.q : Eigen::Quaterniond::Identity(),
+                 message.orientation);
   return message;
 }
 
@@ -108,8 +112,8 @@ image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
   const ipc::ImageInfo info = probe_image_file(bytes, image.file);
   if (info.width_px != camera.parameters.width_px || info.height_px != camera.parameters.height_px) {
     throw InputError(image.file.string() + ": expected " + std::to_string(camera.parameters.width_px) + "x" +
-                     std::to_string(camera.parameters.height_px) + " pixels as of camera " + camera.name + ", found " +
-                     std::to_string(info.width_px) + "x" + std::to_string(info.height_px));
+                     std::to_string(camera.parameters.height_px) + " pixels as of camera " + camera.name +
+                     ", found " + std::to_string(info.width_px) + "x" + std::to_string(info.height_px));
   }
   image_t message{};
   message.utime = image.utime;
@@ -148,7 +152,7 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::filesystem::path& file) {
   try {
     return std::make_unique<ipc::LogWriter>(file.string());
   } catch (const std::runtime_error& e) {
-    throw InputError(e.what());   // a name that cannot be written is wrong use
+    throw InputError(e.what());  // a name that cannot be written is wrong use
   }
 }
 
@@ -157,7 +161,7 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::filesystem::path& file) {
 void write_recording(const Recording& recording, const std::filesystem::path& log_file) {
   const std::vector<Event> events = events_in_order(recording);
   const std::unique_ptr<ipc::LogWriter> log = open_log(log_file);
-  const std::int64_t first_utime = events.front().utime;   // every importer demands an image
+  const std::int64_t first_utime = events.front().utime;  // every importer demands an image
   log->write_message(ipc::kCalibrationChannel, first_utime, calibration_message(recording, first_utime));
   Progress progress(log_file.filename().string(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) {

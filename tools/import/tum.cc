@@ -28,7 +28,8 @@ void read_images(const fs::path& folder, Recording* recording) {
   for (const FieldLine& line : text.lines()) {
     line.require_fields(2, "timestamp filename");
     const std::int64_t utime = line.utime_from_seconds_at(0, "the timestamp");
-    if (utime <= last_utime) line.fail("expected a timestamp after the one above, found " + std::string(line.text(0)));
+    if (utime <= last_utime)
+      line.fail("expected a timestamp after the one above, found " + std::string(line.text(0)));
     last_utime = utime;
     const fs::path file = folder / std::string(line.text(1));
     if (fs::exists(file)) {
@@ -39,7 +40,8 @@ void read_images(const fs::path& folder, Recording* recording) {
     ++sequence;
   }
   if (recording->images.empty()) {
-    throw InputError((folder / "rgb.txt").string() + ": lists no image that exists, expected lines 'timestamp filename'");
+    throw InputError((folder / "rgb.txt").string() +
+                     ": lists no image that exists, expected lines 'timestamp filename'");
   }
 }
 
@@ -56,7 +58,8 @@ void read_truth(const fs::path& file, Recording* recording) {
 }  // namespace
 
 Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file) {
-  if (!fs::is_directory(folder)) throw InputError(folder.string() + ": no such folder, expected one that holds rgb.txt");
+  if (!fs::is_directory(folder))
+    throw InputError(folder.string() + ": no such folder, expected one that holds rgb.txt");
   Recording recording;
   recording.cameras = {make_camera(camera_file)};
   if (read_camera_file(camera_file).T_body_camera) recording.body_name = "body";

@@ -30,7 +30,8 @@ Eigen::Quaterniond read_quaternion(const FieldLine& line, bool* is_identity) {
 
 Trajectory read_tum(const std::filesystem::path& file) {
   const FieldFile text(file, kCommaAndBlanks);
-  if (text.lines().empty()) throw InputError(file.string() + ": no poses, expected lines '" + std::string(kTumLayout) + "'");
+  if (text.lines().empty())
+    throw InputError(file.string() + ": no poses, expected lines '" + std::string(kTumLayout) + "'");
   Trajectory trajectory;
   trajectory.has_orientation = false;
   for (const FieldLine& line : text.lines()) {
@@ -42,7 +43,8 @@ Trajectory read_tum(const std::filesystem::path& file) {
     pose.pose.q = read_quaternion(line, &is_identity);
     if (!is_identity) trajectory.has_orientation = true;
     if (!trajectory.poses.empty() && pose.time_s < trajectory.poses.back().time_s) {
-      line.fail("time " + std::string(line.text(0)) + " lies before the line above, expected ascending times");
+      line.fail("time " + std::string(line.text(0)) +
+                " lies before the line above, expected ascending times");
     }
     trajectory.poses.push_back(pose);
   }
@@ -53,9 +55,9 @@ std::string to_tum(const Trajectory& trajectory) {
   std::string text = "# seconds tx ty tz qx qy qz qw\n";
   char line[256];
   for (const TimedPose& p : trajectory.poses) {
-    const int size = std::snprintf(line, sizeof line, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", p.time_s,
-                                   p.pose.t.x(), p.pose.t.y(), p.pose.t.z(), p.pose.q.x(), p.pose.q.y(),
-                                   p.pose.q.z(), p.pose.q.w());
+    const int size =
+        std::snprintf(line, sizeof line, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", p.time_s, p.pose.t.x(),
+                      p.pose.t.y(), p.pose.t.z(), p.pose.q.x(), p.pose.q.y(), p.pose.q.z(), p.pose.q.w());
     text.append(line, std::min(static_cast<std::size_t>(size), sizeof line - 1));
   }
   return text;
