@@ -342,17 +342,17 @@ struct Candidate {
   double cost = 0.0;
 };
 
-// Truncated chi-squares of the epipolar residuals; a point behind a view costs as much as an outlier.
+// Truncated chi-square of a match's epipolar residual; a point behind a view costs as much as an outlier.
+double match_cost(const Problem& p, const SE3& T_2_1, size_t i) {
+  const double chi2 = epipolar_residual2_rad2(T_2_1, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
+  if (chi2 >= kChi2_1Dof) return kChi2_1Dof;
+  const bool behind = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad).side == Side::kBehind;
+  return behind ? kChi2_1Dof : chi2;
+}
+
 double motion_cost(const Problem& p, const SE3& T_2_1) {
   double cost = 0.0;
-  for (size_t i = 0; i < p.size(); ++i) {
-    const double chi2 = epipolar_residual2_rad2(T_2_1, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
-    if (chi2 >= kChi2_1Dof || match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad).side == Side::kBehind) {
-      cost += kChi2_1Dof;
-    } else {
-      cost += chi2;
-    }
-  }
+  for (size_t i = 0; i < p.size(); ++i) cost += match_cost(p, T_2_1, i);
   return cost;
 }
 
@@ -523,11 +523,24 @@ const Candidate* agreeing(const std::vector<Candidate>& on_plane, const SE3& bes
   return chosen;
 }
 
-double rival_margin(const std::vector<Candidate>& candidates, double variance) {
+// Vuong's statistic of the best motion against the best different one, with the second moment about zero in
+// place of the variance, which vanishes where every match pays the same. Motions that share a plane's
+// homography see different components of each match's noise, so that their costs differ by chance by the root
+// of the sum of squares.
+double rival_sigmas(const Problem& p, const std::vector<Candidate>& candidates) {
+  const SE3& best = candidates.front().T_2_1;
+  double least = std::numeric_limits<double>::infinity();
   for (const Candidate& c : candidates) {
-    if (different(c.T_2_1, candidates.front().T_2_1)) return (c.cost - candidates.front().cost) / variance;
+    if (!different(c.T_2_1, best)) continue;
+    double sum = 0.0, sum2 = 0.0;
+    for (size_t i = 0; i < p.size(); ++i) {
+      const double difference = match_cost(p, c.T_2_1, i) - match_cost(p, best, i);
+      sum += difference;
+      sum2 += difference * difference;
+    }
+    least = std::min(least, sum2 > 0.0 ? sum / std::sqrt(sum2) : 0.0);
   }
-  return std::numeric_limits<double>::infinity();
+  return least;
 }
 
 }  // namespace
@@ -603,10 +616,10 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
   }
   fill_matches(geometry, &result);
   const double variance = observed_variance(geometry);
-  result.rival_cost_margin = rival_margin(candidates, variance);
+  result.rival_sigmas = rival_sigmas(p, candidates);
   if (!enough_inliers(p, result.inliers)) {
     result.status = TwoViewStatus::kPoorModel;
-  } else if (result.rival_cost_margin < options.ambiguity_margin ||
+  } else if (result.rival_sigmas < options.ambiguity_sigmas ||
              result.translation_sigma_rad * std::sqrt(variance) > options.max_translation_sigma_rad) {
     result.status = TwoViewStatus::kAmbiguous;
   } else {

@@ -31,9 +31,10 @@ struct TwoViewOptions {
   // Of the matches that a general motion explains, the share that a rotation does not: at most this, no
   // parallax.
   double max_unexplained_share = 0.1;
-  // Two motions are equally good where their costs (sums of truncated chi-squares) differ by less than this,
-  // in units of the noise as it turns out: a likelihood ratio of exp(-6).
-  double ambiguity_margin = 12.0;
+  // Two motions are equally good where their costs (sums of truncated chi-squares) differ by less than this
+  // many standard deviations of the difference, as its spread over the matches shows (Vuong, Econometrica
+  // 1989).
+  double ambiguity_sigmas = 3.0;
   double max_translation_sigma_rad = 0.15;
   int max_samples = 400;  // a model; fewer where the inlier share allows
   uint64_t seed = 0x5eed;
@@ -56,8 +57,8 @@ struct TwoViewResult {
   size_t valid_depths = 0;
   size_t essential_inliers = 0, homography_inliers = 0, rotation_inliers = 0;
   double unexplained_share = 0.0;  // see max_unexplained_share
-  double rival_cost_margin =
-      0.0;  // cost of the best different motion minus the best, noise units; large: none
+  double rival_sigmas =
+      0.0;  // how much worse the best different motion is, see ambiguity_sigmas; infinity: none
 };
 
 // bearings_1[i] and bearings_2[i] (unit, any field of view) are matched; sigma_rad is the standard deviation
