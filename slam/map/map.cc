@@ -100,7 +100,6 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
 }
 
 void Map::detach_feature(const Observation& o) {
-  if (o.feature < 0) return;
   if (Keyframe* k = keyframes_.get(o.keyframe)) k->landmarks[static_cast<std::size_t>(o.feature)] = {};
 }
 
@@ -121,24 +120,25 @@ const Observation* Map::find_observation(const Landmark& landmark, KeyframeHandl
 bool Map::add_observation(LandmarkHandle handle, const Observation& observation) {
   Landmark& l = landmarks_[handle];
   Keyframe& k = keyframes_[observation.keyframe];
+  const auto feature = static_cast<std::size_t>(observation.feature);
+  if (observation.feature < 0 || feature >= k.landmarks.size() || !k.landmarks[feature].is_null()) return false;
   if (find_observation(l, observation.keyframe) != nullptr) return false;
-  if (observation.feature >= 0) {
-    LandmarkHandle& owner = k.landmarks[static_cast<std::size_t>(observation.feature)];
-    if (!owner.is_null()) return false;
-    owner = handle;
-  }
+  k.landmarks[feature] = handle;
   const auto later = std::find_if(l.observations.begin(), l.observations.end(),
                                   [&](const Observation& o) { return keyframes_[o.keyframe].id > k.id; });
   l.observations.insert(later, observation);
   l.last_seen_keyframe = std::max(l.last_seen_keyframe, k.id);
-  const double angle = parallax(l, observation);
-  if (angle > l.max_parallax_rad) {
-    l.max_parallax_rad = angle;
-    l.parallax_keyframe = observation.keyframe;
-  }
+  note_parallax(observation, &l);
   if (l.observations.size() > static_cast<std::size_t>(capacity_.observations_per_landmark))
     thin_observations(l, handle);
   return true;
+}
+
+void Map::note_parallax(const Observation& o, Landmark* l) const {
+  const double angle = parallax(*l, o);
+  if (angle <= l->max_parallax_rad) return;
+  l->max_parallax_rad = angle;
+  l->parallax_keyframe = o.keyframe;
 }
 
 void Map::thin_observations(Landmark& l, LandmarkHandle handle) {
@@ -162,14 +162,19 @@ bool Map::remove_observation(LandmarkHandle handle, KeyframeHandle keyframe) {
     remove_landmark(handle);
     return false;
   }
-  if (l.parallax_keyframe == keyframe) l.parallax_keyframe = {};
+  if (l.parallax_keyframe == keyframe) {
+    // The best pair is gone: the best of those that are left.
+    l.max_parallax_rad = 0.0;
+    l.parallax_keyframe = {};
+    for (const Observation& o : l.observations) note_parallax(o, &l);
+  }
   if (l.host == keyframe) rehost(handle, l.observations.front().keyframe);
   return true;
 }
 
 void Map::rehost(LandmarkHandle handle, KeyframeHandle new_host) {
   Landmark& l = landmarks_[handle];
-  if (l.host == new_host) return;
+  if (l.host == new_host || find_observation(l, new_host) == nullptr) return;
   const SE3 T_world_anchor = keyframes_[l.host].T_world_body * l.T_host_anchor;
   l.T_host_anchor = keyframes_[new_host].T_world_body.inverse() * T_world_anchor;
   l.host = new_host;

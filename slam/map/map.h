@@ -28,14 +28,15 @@ class Map {
   // no patch can be cut around the feature.
   [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, std::size_t feature);
   void remove_landmark(LandmarkHandle handle);
-  // False where the keyframe already sees the landmark or the feature belongs to another one.
+  // False where the keyframe already sees the landmark, has no such feature, or the feature belongs to another one.
   bool add_observation(LandmarkHandle landmark, const Observation& observation);
   // Removes the sighting by `keyframe`; re-hosts where it was the host's. The landmark goes when fewer than two are
   // left. True while the landmark lives.
   bool remove_observation(LandmarkHandle landmark, KeyframeHandle keyframe);
   // Moves the observations of `from` to `into` where they do not collide, then removes `from`.
   void fuse(LandmarkHandle into, LandmarkHandle from);
-  // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are.
+  // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are. Does nothing where
+  // new_host does not see the landmark: a host must be an observer, or the landmark would not hear of its removal.
   void rehost(LandmarkHandle landmark, KeyframeHandle new_host);
 
   [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe);
@@ -73,6 +74,8 @@ class Map {
   };
 
   void detach_feature(const Observation& observation);
+  // Keeps the largest parallax and who gives it.
+  void note_parallax(const Observation& observation, Landmark* landmark) const;
   void thin_observations(Landmark& landmark, LandmarkHandle handle);
 
   CapacityConfig capacity_;

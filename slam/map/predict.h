@@ -45,27 +45,42 @@ struct DescriptorQuery {
   int max_hamming = 64;
   float ratio = 0.9F;       // best must be below ratio * second best (of another place), 1: no test
 };
-// Index of the best feature that `usable(index)` admits, or -1.
+// Index of the best feature that `usable(index)` admits, or -1. Corners at the best one's place are no rivals of it: the
+// same corner is often found on the next level too.
 template <typename Usable>
 [[nodiscard]] int find_descriptor(const FeatureSet& set, const FeatureGrid& grid, const DescriptorQuery& q,
                                   Usable&& usable, int* distance = nullptr) {
-  int best = -1, best_distance = 257, second_distance = 257;
-  grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
-    if (!usable(i)) return;
-    const int d = hamming_distance(q.descriptor, set.descriptors[i]);
+  constexpr int kNone = 257;
+  int best = -1, best_distance = kNone, second_distance = kNone;
+  bool uncertain = false;    // second_distance was taken around another best one
+  const auto visit = [&](auto&& consider) {
+    grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
+      if (usable(i)) consider(i, hamming_distance(q.descriptor, set.descriptors[i]));
+    });
+  };
+  const auto at_best = [&](std::size_t i) {
+    return best >= 0 && same_place(set.features[static_cast<std::size_t>(best)], set.features[i]);
+  };
+  visit([&](std::size_t i, int d) {
     if (d < best_distance) {
-      // The same corner found on the next level is no rival.
-      if (best >= 0 && !same_place(set.features[static_cast<std::size_t>(best)], set.features[i]))
-        second_distance = best_distance;
+      uncertain = at_best(i);
+      if (!uncertain) second_distance = best_distance;
       best_distance = d;
       best = static_cast<int>(i);
-    } else if (d < second_distance && !same_place(set.features[static_cast<std::size_t>(best)], set.features[i])) {
+    } else if (d < second_distance && !at_best(i)) {
       second_distance = d;
     }
   });
   if (best < 0 || best_distance > q.max_hamming) return -1;
+  if (uncertain) {
+    second_distance = kNone;
+    visit([&](std::size_t i, int d) {
+      if (d < second_distance && !at_best(i)) second_distance = d;
+    });
+  }
   if (static_cast<float>(best_distance) > q.ratio * static_cast<float>(second_distance)) return -1;
   if (distance != nullptr) *distance = best_distance;
   return best;
 }
+
 }  // namespace farpoint::slam
