@@ -15,24 +15,29 @@ double evaluate(const Coefficients& c, size_t degree, double x) {
   return value;
 }
 
-// The root between low and high, where the signs differ: Newton, halving the bracket whenever it leaves it.
+// The root between low and high, where the signs differ: Newton, or halving the bracket where Newton leaves
+// it or does not at least halve its step.
 double bracketed_root(const Coefficients& c, const Coefficients& derivative, size_t degree, double low,
-                      double high) {
+                      double high, double tolerance) {
   const bool rising = evaluate(c, degree, low) < 0.0;
   double x = 0.5 * (low + high);
-  for (int i = 0; i < 80; ++i) {
+  double last_step = high - low;
+  for (int i = 0; i < 100; ++i) {
     const double value = evaluate(c, degree, x);
     if (value == 0.0) return x;
     ((value < 0.0) == rising ? low : high) = x;
     double next = x - value / evaluate(derivative, degree - 1, x);
-    // Newton's point is kept only inside the bracket; every fourth step halves it, so that it always shrinks.
-    if (!(next > low && next < high) || i % 4 == 3) next = 0.5 * (low + high);
-    const double step = std::abs(next - x);
+    if (!(next > low && next < high) || std::abs(next - x) > 0.5 * last_step) next = 0.5 * (low + high);
+    last_step = std::abs(next - x);
     x = next;
-    if (step <= 1e-15 * (1.0 + std::abs(x))) break;
+    if (last_step <= tolerance * (1.0 + std::abs(x))) break;
   }
   return x;
 }
+
+// A root of a derivative only separates the roots of the polynomial above it and need not be sharp.
+constexpr double kRootTolerance = 1e-14;
+constexpr double kSeparatorTolerance = 1e-9;
 
 }  // namespace
 
@@ -59,8 +64,8 @@ RealRoots real_roots(std::span<const double> c, double low, double high) {
       const double right = i < roots.count ? roots.value[i] : high;
       const double right_value = evaluate(derivative[k], degree - k, right);
       if ((left_value < 0.0) != (right_value < 0.0) && found.count < degree - k) {
-        found.value[found.count++] =
-            bracketed_root(derivative[k], derivative[k + 1], degree - k, left, right);
+        found.value[found.count++] = bracketed_root(derivative[k], derivative[k + 1], degree - k, left, right,
+                                                    k == 0 ? kRootTolerance : kSeparatorTolerance);
       }
       left = right;
       left_value = right_value;
