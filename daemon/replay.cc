@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "daemon/build_info.h"
 #include "daemon/can_sink.h"
 #include "daemon/log_frame_source.h"
 #include "daemon/logging.h"
@@ -142,6 +143,8 @@ class Outputs {
 std::unique_ptr<Session> make_session(const Config& config, const LogFrameSource& source, Outputs* outputs) {
   try {
     const slam::Rig rig = make_rig(source.calibration(), config.camera.index);
+    spdlog::info("farpointd {}, configuration {:016x}, lockstep replay of {}", build_text(),
+                 config_hash(config), source.name());
     return std::make_unique<Session>(config, rig, calibration_hash(source.calibration()), outputs->sinks(),
                                      outputs->publisher());
   } catch (const InputError& error) {

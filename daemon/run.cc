@@ -1,13 +1,11 @@
 #include "daemon/run.h"
 
 #include <dlfcn.h>
-#include <spdlog/spdlog.h>
 
 #include <cstdio>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 
-#include "daemon/build_info.h"
 #include "daemon/config.h"
 #include "daemon/logging.h"
 #include "daemon/options.h"
@@ -20,14 +18,12 @@ namespace {
 constexpr const char* kSystemConfig = "/etc/farpoint/farpoint.yaml";
 constexpr int kFailed = 1, kWrongUse = 2;
 
-Config load_configuration(const Options& options, std::string* source) {
+Config load_configuration(const Options& options) {
   Config config;
   ConfigOrigins origins;
   std::error_code ignored;
-  *source = "built-in defaults";
   if (options.config_path || std::filesystem::exists(kSystemConfig, ignored)) {
-    *source = options.config_path.value_or(kSystemConfig);
-    load_config_file(*source, &config, &origins);
+    load_config_file(options.config_path.value_or(kSystemConfig), &config, &origins);
   }
   for (const std::string& setting : options.settings) apply_setting(setting, &config, &origins);
   check_relations(config, origins);
@@ -54,11 +50,8 @@ int run_checked(int argc, const char* const* argv) {
     std::fputs(line.text_and_leave.c_str(), stdout);
     return 0;
   }
-  std::string source;
-  const Config config = load_configuration(line.options, &source);
+  const Config config = load_configuration(line.options);
   start_logging(config.log.level);
-  spdlog::info("farpointd {}, configuration {} ({:016x}), lockstep replay of {}", build_text(), source,
-               config_hash(config), line.options.replay);
   make_libraries_single_threaded();
   return replay_lockstep(line.options, config);
 }

@@ -47,12 +47,14 @@ std::vector<std::pair<std::int64_t, Epoch>> decode_can_log(const std::string& pa
     if (message == dbc.end()) continue;
     if (message->second.name == "FARPOINT_STATUS") epochs.emplace_back(parsed.utime, Epoch{});
     EXPECT_EQ(epochs.back().first, parsed.utime);
-    for (const auto& [name, signal] : message->second.signals) epochs.back().second[name] = signal.value(parsed.frame);
+    for (const auto& [name, signal] : message->second.signals)
+      epochs.back().second[name] = signal.value(parsed.frame);
   }
   return epochs;
 }
 
-std::string can_log_of(const std::string& path, const std::vector<FrameOutput>& frames, CanPoseFrame pose_frame) {
+std::string can_log_of(const std::string& path, const std::vector<FrameOutput>& frames,
+                       CanPoseFrame pose_frame) {
   CanSink sink(pose_frame);
   sink.log_to(std::make_unique<ipc::CandumpWriter>(path, "can0"));
   for (const FrameOutput& frame : frames) sink.on_frame(frame);
@@ -113,7 +115,7 @@ TEST(CanSink, WithoutAScalePositionAndVelocityAreNotAvailable) {
                            "SigmaPositionX", "SigmaPositionY", "SigmaPositionZ"}) {
     EXPECT_TRUE(std::isnan(e[name])) << name;
   }
-  EXPECT_FALSE(std::isnan(e["Heading"]));    // angles need no scale
+  EXPECT_FALSE(std::isnan(e["Heading"]));  // angles need no scale
   EXPECT_FALSE(std::isnan(e["YawRate"]));
   EXPECT_EQ(e["ScaleState"], 0.0);
 }
@@ -122,7 +124,7 @@ TEST(CanSink, LossIsSaidInTheSameEpochAndLeavesNoNumber) {
   const test::Scratch scratch;
   std::mt19937_64 random(4);
   std::vector<FrameOutput> frames{make_frame_output(result_at(0, &random), 1.0)};
-  slam::FrameResult lost = result_at(100'000, &random);    // an estimate is there, but the state says lost
+  slam::FrameResult lost = result_at(100'000, &random);  // an estimate is there, but the state says lost
   lost.state = slam::State::kLost;
   frames.push_back(make_frame_output(lost, 1.0));
   auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kMap));
@@ -130,14 +132,14 @@ TEST(CanSink, LossIsSaidInTheSameEpochAndLeavesNoNumber) {
   Epoch& e = epochs[1].second;
   EXPECT_EQ(e["State"], 5.0);
   EXPECT_EQ(e["PoseValid"], 0.0);
-  for (const char* name : {"PositionX", "PositionZ", "Heading", "Roll", "Pitch", "VelocityX", "YawRate", "Quality",
-                           "SigmaPositionX", "SigmaHeading"}) {
+  for (const char* name : {"PositionX", "PositionZ", "Heading", "Roll", "Pitch", "VelocityX", "YawRate",
+                           "Quality", "SigmaPositionX", "SigmaHeading"}) {
     EXPECT_TRUE(std::isnan(e[name])) << name;
   }
 }
 
-// Spread of the decoded angles when the body's axes are disturbed by the covariance: the published sigmas must match
-// at attitudes far from level, where body axes and Euler angles differ most.
+// Spread of the decoded angles when the body's axes are disturbed by the covariance: the published sigmas
+// must match at attitudes far from level, where body axes and Euler angles differ most.
 TEST(CanSink, AnglesAndPositionsCarryTheirOwnSigmas) {
   slam::FrameResult r;
   r.state = slam::State::kTracking;
@@ -201,8 +203,9 @@ TEST(Publisher, LogHoldsEveryMessageAtItsFramesTime) {
   }
   lcm_eventlog_destroy(log);
   const std::vector<std::pair<std::string, std::int64_t>> expected{
-      {"FARPOINT_ODOMETRY", 1'000'000}, {"FARPOINT_POSE", 1'000'000},     {"FARPOINT_MAP_FROM_ODOM", 1'000'000},
-      {"POSE", 1'000'000},              {"FARPOINT_ODOMETRY", 1'100'000}, {"FARPOINT_POSE", 1'100'000},
+      {"FARPOINT_ODOMETRY", 1'000'000},      {"FARPOINT_POSE", 1'000'000},
+      {"FARPOINT_MAP_FROM_ODOM", 1'000'000}, {"POSE", 1'000'000},
+      {"FARPOINT_ODOMETRY", 1'100'000},      {"FARPOINT_POSE", 1'100'000},
       {"FARPOINT_MAP_FROM_ODOM", 1'100'000}, {"FARPOINT_TRAJECTORY", 1'100'000}};
   EXPECT_EQ(seen, expected);
 }
