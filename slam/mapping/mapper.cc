@@ -140,6 +140,9 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
   attach_sightings(keyframe, request);
   cull_recent_landmarks();
   map_.update_covisibility(keyframe);
+  // What tracking saw was a view some frames old: the map of today may know more of these corners already.
+  search_neighbours_landmarks(keyframe);
+  map_.update_covisibility(keyframe);
 
   const std::uint64_t first_new = counts_.landmarks_made;
   maker_.process(keyframe, neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
@@ -229,12 +232,16 @@ void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle
 }
 
 void Mapper::fuse_neighbourhood(KeyframeHandle keyframe) {
-  const std::vector<KeyframeHandle> around = neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours));
   const std::vector<LandmarkHandle> own = map_.keyframes()[keyframe].landmarks;
-  for (const KeyframeHandle& n : around) search_into(n, own);
+  for (const KeyframeHandle& n : neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)))
+    search_into(n, own);
+  search_neighbours_landmarks(keyframe);
+}
+
+void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
   std::vector<LandmarkHandle> theirs;
   std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
-  for (const KeyframeHandle& n : around)
+  for (const KeyframeHandle& n : neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)))
     for (const LandmarkHandle& h : map_.keyframes()[n].landmarks)
       if (map_.landmarks().contains(h) && taken[h.index] == 0) {
         taken[h.index] = 1;

@@ -44,6 +44,7 @@ class Mapper {
 
   // Duplicates: landmarks of the one keyframe searched in the other.
   void fuse_neighbourhood(KeyframeHandle keyframe);
+  void search_neighbours_landmarks(KeyframeHandle keyframe);
   void fuse(LandmarkHandle into, LandmarkHandle from);
   void search_into(KeyframeHandle keyframe, const std::vector<LandmarkHandle>& landmarks);
 
