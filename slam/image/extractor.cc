@@ -27,7 +27,8 @@ std::size_t padded(int width) {
   return static_cast<std::size_t>((width + 2 * kRowAlignment - 1) / kRowAlignment * kRowAlignment);
 }
 
-struct LevelCorners {
+// What one level has while a frame is worked on.
+struct Level {
   std::vector<Corner> corners;
   int cell_columns = 0, cell_rows = 0;
 };
@@ -39,14 +40,12 @@ struct Extractor::Workspace {
             const ExtractorOptions& extractor_options);
 
   void detect(const Pyramid& pyramid, int l, const ImageView& mask);
-  void drop_weak(LevelCorners* level);
+  void scan(const ImageView& image, float scale, const ImageView& mask, PixelBox box, int threshold,
+            std::vector<Corner>* corners);
   void choose(const Pyramid& pyramid);
   void blur(const ImageView& image);
   void describe(const Pyramid& pyramid, int l, FeatureSet* out);
 
-  [[nodiscard]] std::size_t cell_of(const LevelCorners& level, const Corner& c) const {
-    return static_cast<std::size_t>((c.y / options.cell_px) * level.cell_columns + c.x / options.cell_px);
-  }
   [[nodiscard]] std::uint8_t* score_row(int y) {
     return scores.data() + static_cast<std::size_t>(y % 3) * row_stride;
   }
@@ -57,14 +56,14 @@ struct Extractor::Workspace {
   ExtractorOptions options;
   const Kernels* kernels = nullptr;  // of the running extract()
   std::size_t row_stride = 0;        // of all rows below, elements
-  std::vector<LevelCorners> levels;
+  std::vector<Level> levels;
   std::vector<double> weights;  // share of each level
   std::vector<int> available, quota;
-  std::vector<std::uint8_t> scores;     // three rows of FAST scores
-  std::vector<std::uint16_t> maxima;    // one row
-  std::vector<std::uint8_t> cell_best;  // of one level
-  std::vector<std::int16_t> ring;       // seven rows of the blur
-  std::vector<std::uint8_t> blurred;    // one level
+  std::vector<std::uint8_t> scores;    // three rows of FAST scores
+  std::vector<std::uint16_t> maxima;   // one row
+  std::vector<std::uint8_t> cell_hit;  // of one level: 1 where a strong corner lies
+  std::vector<std::uint8_t> ring;      // seven rows of the blur
+  std::vector<std::uint8_t> blurred;   // one level
 };
 
 Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyramid_options,
@@ -82,29 +81,26 @@ Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyr
     const double scale = std::pow(pyramid_options.scale_factor, static_cast<double>(l));
     const int w = static_cast<int>(std::lround(width / scale)),
               h = static_cast<int>(std::lround(height / scale));
+    Level& level = levels[l];
     // No two maxima of 3x3 neighbourhoods lie in the same 2x2 block.
-    levels[l].corners.reserve(static_cast<std::size_t>((w / 2 + 1) * (h / 2 + 1)));
-    levels[l].cell_columns = w / options.cell_px + 1;
-    levels[l].cell_rows = h / options.cell_px + 1;
+    level.corners.reserve(static_cast<std::size_t>((w / 2 + 1) * (h / 2 + 1)));
+    level.cell_columns = w / options.cell_px + 1;
+    level.cell_rows = h / options.cell_px + 1;
     // Between equal density on the level's own pixels (1 / scale^2) and equal numbers.
     weights.push_back(1 / scale);
   }
   scores.assign(3 * row_stride, 0);
   maxima.assign(row_stride, 0);
-  cell_best.assign(static_cast<std::size_t>(levels[0].cell_columns * levels[0].cell_rows), 0);
+  cell_hit.assign(static_cast<std::size_t>(levels[0].cell_columns * levels[0].cell_rows), 0);
   ring.assign(7 * row_stride, 0);
   blurred.assign(row_stride * static_cast<std::size_t>(height), 0);
 }
 
-// All maxima above the lower threshold. The score is the highest threshold a corner passes, so that one pass
-// serves both thresholds.
-void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView& mask) {
-  LevelCorners& level = levels[static_cast<std::size_t>(l)];
-  level.corners.clear();
-  const ImageView image = pyramid.level(l);
-  const int begin = kBorder, end = image.width_px - kBorder, last_row = image.height_px - kBorder;
-  if (end <= begin || last_row <= kBorder) return;
-  const float scale = pyramid.scale(l);
+// Corners of at least `threshold` in `box`, added to *corners. A corner must be a maximum of its 3x3
+// neighbourhood, in the box or not; scores under the threshold count as 0, which takes nothing from a
+// stronger one.
+void Extractor::Workspace::scan(const ImageView& image, float scale, const ImageView& mask, PixelBox box,
+                                int threshold, std::vector<Corner>* corners) {
   const auto masked = [&](int x, int y) {
     if (mask.data == nullptr) return false;
     const auto to_base = [scale](int p, int size) {
@@ -113,57 +109,69 @@ void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView
     };
     return mask.data[to_base(y, mask.height_px) * mask.stride_bytes + to_base(x, mask.width_px)] == 0;
   };
-  std::fill(scores.begin(), scores.end(), std::uint8_t{0});
+  // Row y is scored, then row y - 1 has both neighbours.
   bool any[3] = {};
-  // Row y is scored, then row y - 1 has both neighbours. Rows outside count as 0.
-  for (int y = kBorder; y <= last_row; ++y) {
-    any[y % 3] = false;
-    if (y < last_row) {
-      any[y % 3] =
-          kernels->fast_score_row(image.data + static_cast<std::ptrdiff_t>(y) * image.stride_bytes,
-                                  image.stride_bytes, begin, end, options.fast_threshold_min, score_row(y));
-    } else {
-      std::fill_n(score_row(y), row_stride, std::uint8_t{0});
-    }
-    if (!any[(y - 1) % 3]) continue;
-    const std::uint8_t* here = score_row(y - 1);
-    const int count = kernels->maxima_row(score_row(y - 2), here, score_row(y), begin, end, maxima.data());
+  for (int y = box.y0 - 1; y <= box.y1; ++y) {
+    const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(y) * image.stride_bytes;
+    any[y % 3] =
+        kernels->fast_score_row(row, image.stride_bytes, box.x0 - 1, box.x1 + 1, threshold, score_row(y));
+    const int centre = y - 1;
+    if (centre < box.y0 || !any[centre % 3]) continue;
+    const std::uint8_t* here = score_row(centre);
+    const int count =
+        kernels->maxima_row(score_row(centre - 1), here, score_row(y), box.x0, box.x1, maxima.data());
     for (int i = 0; i < count; ++i) {
       const int x = maxima[static_cast<std::size_t>(i)];
-      if (masked(x, y - 1)) continue;
-      level.corners.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y - 1), here[x]});
+      if (masked(x, centre)) continue;
+      corners->push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(centre), here[x]});
     }
   }
 }
 
-// Corners under the upper threshold stay only in cells that have none above it.
-void Extractor::Workspace::drop_weak(LevelCorners* level) {
-  std::fill(cell_best.begin(), cell_best.end(), std::uint8_t{0});
-  for (const Corner& c : level->corners) {
-    std::uint8_t& best = cell_best[cell_of(*level, c)];
-    best = std::max(best, c.score);
+// Strong corners everywhere, then weak ones where a cell has none.
+void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView& mask) {
+  Level& level = levels[static_cast<std::size_t>(l)];
+  level.corners.clear();
+  const ImageView image = pyramid.level(l);
+  const PixelBox inside{kBorder, kBorder, image.width_px - kBorder, image.height_px - kBorder};
+  if (inside.x1 <= inside.x0 || inside.y1 <= inside.y0) return;
+  scan(image, pyramid.scale(l), mask, inside, options.fast_threshold, &level.corners);
+  std::fill(cell_hit.begin(), cell_hit.end(), std::uint8_t{0});
+  const int cell = options.cell_px;
+  for (const Corner& c : level.corners) {
+    cell_hit[static_cast<std::size_t>((c.y / cell) * level.cell_columns + c.x / cell)] = 1;
   }
-  std::erase_if(level->corners, [&](const Corner& c) {
-    return c.score < options.fast_threshold && cell_best[cell_of(*level, c)] >= options.fast_threshold;
-  });
+  if (options.fast_threshold_min == options.fast_threshold) return;
+  for (int row = 0; row < level.cell_rows; ++row) {
+    const std::uint8_t* hit = cell_hit.data() + static_cast<std::ptrdiff_t>(row) * level.cell_columns;
+    for (int first = 0, last = 0; first < level.cell_columns; first = last + 1) {
+      last = first;  // a run of cells without a hit is [first, last)
+      while (last < level.cell_columns && hit[last] == 0) ++last;
+      const PixelBox box{std::max(first * cell, inside.x0), std::max(row * cell, inside.y0),
+                         std::min(last * cell, inside.x1), std::min((row + 1) * cell, inside.y1)};
+      if (box.x1 <= box.x0 || box.y1 <= box.y0) continue;
+      scan(image, pyramid.scale(l), mask, box, options.fast_threshold_min, &level.corners);
+    }
+  }
 }
 
 void Extractor::Workspace::choose(const Pyramid& pyramid) {
   for (std::size_t l = 0; l < levels.size(); ++l) {
-    drop_weak(&levels[l]);
     available[l] = static_cast<int>(levels[l].corners.size());
   }
   share_quota(options.features, weights, available, quota);
   for (std::size_t l = 0; l < levels.size(); ++l) {
-    LevelCorners& level = levels[l];
+    Level& level = levels[l];
     const ImageView image = pyramid.level(static_cast<int>(l));
     const PixelBox box{kBorder, kBorder, image.width_px - kBorder, image.height_px - kBorder};
     level.corners.resize(static_cast<std::size_t>(select_spread(level.corners, box, quota[l])));
-    std::sort(level.corners.begin(), level.corners.end(), [&](const Corner& a, const Corner& b) {
-      const std::size_t cell_a = cell_of(level, a), cell_b = cell_of(level, b);
-      if (cell_a != cell_b) return cell_a < cell_b;
-      return a.y != b.y ? a.y < b.y : a.x < b.x;
-    });
+    const int cell = options.cell_px;
+    const auto place = [&](const Corner& c) {
+      const int index = (c.y / cell) * level.cell_columns + c.x / cell;
+      return (static_cast<std::uint64_t>(index) << 32) | (static_cast<std::uint64_t>(c.y) << 16) | c.x;
+    };
+    std::sort(level.corners.begin(), level.corners.end(),
+              [&](const Corner& a, const Corner& b) { return place(a) < place(b); });
   }
 }
 
@@ -177,14 +185,14 @@ void Extractor::Workspace::blur(const ImageView& image) {
                       ring_row(y));
     const int centre = y - 3;
     if (centre < first) continue;
-    const std::int16_t* rows[7];
+    const std::uint8_t* rows[7];
     for (int k = 0; k < 7; ++k) rows[k] = ring_row(centre - 3 + k);
     kernels->blur_column(rows, width, blurred_row(centre) + kBlurBorder);
   }
 }
 
 void Extractor::Workspace::describe(const Pyramid& pyramid, int l, FeatureSet* out) {
-  const LevelCorners& level = levels[static_cast<std::size_t>(l)];
+  const Level& level = levels[static_cast<std::size_t>(l)];
   if (level.corners.empty()) return;
   const ImageView image = pyramid.level(l);
   const float scale = pyramid.scale(l);

@@ -50,19 +50,22 @@ struct Kernels {
   void (*combine_rows)(const std::int16_t* const rows[3], const std::int16_t weights[3], int width,
                        std::uint8_t* out);
 
-  // Gaussian blur, sigma 2, seven taps. blur_row gives Q6 and needs three pixels on both sides of
-  // source[0..width) rounded up to kRowAlignment (what they hold at the edges is the caller's business).
-  // blur_column combines seven such rows.
-  void (*blur_row)(const std::uint8_t* source, int width, std::int16_t* out);
-  void (*blur_column)(const std::int16_t* const rows[7], int width, std::uint8_t* out);
+  // Blur with (1 2 3 4 3 2 1) / 16 (variance 2.5 px^2), made of rounded averages of two: avg(a, b) = (a + b +
+  // 1) / 2, fine(x) = avg(avg(p[x-1], p[x+1]), p[x]), out(x) = avg(avg(fine(x-2), fine(x+2)), fine(x)).
+  // blur_row needs three pixels on both sides of source[0..width) rounded up to kRowAlignment (what they hold
+  // at the edges is the caller's business); blur_column does the same over seven rows.
+  void (*blur_row)(const std::uint8_t* source, int width, std::uint8_t* out);
+  void (*blur_column)(const std::uint8_t* const rows[7], int width, std::uint8_t* out);
 
   // FAST-9/16: score[x] = the largest threshold t at which nine contiguous of the sixteen pixels on the
   // circle of radius 3 are all brighter than centre + t or all darker than centre - t; 0 where that is below
-  // `threshold` (>= 1). x in [begin, end); three pixels around must exist. Returns false if all scores are 0.
+  // `threshold` (>= 1). x in [begin, end); three pixels around must exist,
+  // and kRowAlignment readable bytes behind them. Returns false if all scores are 0.
   bool (*fast_score_row)(const std::uint8_t* centre_row, std::ptrdiff_t stride, int begin, int end,
                          int threshold, std::uint8_t* score);
   // Positions of [begin, end) whose score is positive and a maximum of its 3x3 neighbourhood; of equal
-  // neighbours the last in raster order wins. Columns begin-1 and end are read. Returns how many were written
+  // neighbours the last in raster order wins. Columns begin-1 and end count, up to
+  // kRowAlignment behind are read. Returns how many were written
   // to `out`.
   int (*maxima_row)(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int begin,
                     int end, std::uint16_t* out);

@@ -30,25 +30,26 @@ void combine_rows(const std::int16_t* const rows[3], const std::int16_t weights[
   }
 }
 
-// exp(-x^2 / (2 * 2^2)) for x = 0..3, scaled to sum 64 over the seven taps (Q6) and to 32768 (Q15).
-constexpr int kBlurQ6[4] = {14, 12, 8, 5};
-constexpr int kBlurQ15[4] = {7082, 6249, 4295, 2299};
-static_assert(kBlurQ6[0] + 2 * (kBlurQ6[1] + kBlurQ6[2] + kBlurQ6[3]) == 64);
-static_assert(kBlurQ15[0] + 2 * (kBlurQ15[1] + kBlurQ15[2] + kBlurQ15[3]) == 32768);
-
-void blur_row(const std::uint8_t* source, int width, std::int16_t* out) {
-  for (int x = 0; x < width; ++x) {
-    int sum = kBlurQ6[0] * source[x];
-    for (int k = 1; k <= 3; ++k) sum += kBlurQ6[k] * (source[x - k] + source[x + k]);
-    out[x] = static_cast<std::int16_t>(sum);
-  }
+std::uint8_t average(int a, int b) {
+  return static_cast<std::uint8_t>((a + b + 1) / 2);
 }
 
-void blur_column(const std::int16_t* const rows[7], int width, std::uint8_t* out) {
+// p[0..6] are seven pixels in a line.
+std::uint8_t blur(const std::uint8_t p[7]) {
+  std::uint8_t fine[3];
+  for (int i = 0; i < 3; ++i) fine[i] = average(average(p[2 * i], p[2 * i + 2]), p[2 * i + 1]);
+  return average(average(fine[0], fine[2]), fine[1]);
+}
+
+void blur_row(const std::uint8_t* source, int width, std::uint8_t* out) {
+  for (int x = 0; x < width; ++x) out[x] = blur(source + x - 3);
+}
+
+void blur_column(const std::uint8_t* const rows[7], int width, std::uint8_t* out) {
   for (int x = 0; x < width; ++x) {
-    int sum = multiply_q15(rows[3][x], kBlurQ15[0]);
-    for (int k = 1; k <= 3; ++k) sum += multiply_q15(rows[3 - k][x] + rows[3 + k][x], kBlurQ15[k]);
-    out[x] = static_cast<std::uint8_t>((sum + 32) >> 6);
+    std::uint8_t column[7];
+    for (int k = 0; k < 7; ++k) column[k] = rows[k][x];
+    out[x] = blur(column);
   }
 }
 

@@ -1,5 +1,7 @@
 // Highway versions of the kernels: compiled once for every instruction set, the best one is chosen at run
 // time. The plain versions in kernels_plain.cc say what is computed; the comments here say only how.
+#include <algorithm>
+
 #include "slam/image/kernels.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -53,38 +55,31 @@ void combine_rows(const std::int16_t* const rows[3], const std::int16_t weights[
   }
 }
 
-void blur_row(const std::uint8_t* HWY_RESTRICT source, int width, std::int16_t* HWY_RESTRICT out) {
-  const I16 d;
-  const U8Half d8;
-  const auto w0 = hn::Set(d, 14), w1 = hn::Set(d, 12), w2 = hn::Set(d, 8), w3 = hn::Set(d, 5);
-  const int step = static_cast<int>(hn::Lanes(d));
-  for (int x = 0; x < width; x += step) {
-    const auto at = [&](int k) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(d8, source + x + k)); };
-    auto sum = hn::Mul(w0, at(0));
-    sum = hn::Add(sum, hn::Mul(w1, hn::Add(at(-1), at(1))));
-    sum = hn::Add(sum, hn::Mul(w2, hn::Add(at(-2), at(2))));
-    sum = hn::Add(sum, hn::Mul(w3, hn::Add(at(-3), at(3))));
-    hn::StoreU(sum, d, out + x);
-  }
-}
-
-void blur_column(const std::int16_t* const rows[7], int width, std::uint8_t* HWY_RESTRICT out) {
-  const I16 d;
-  const U8Half d8;
-  const auto w0 = hn::Set(d, 7082), w1 = hn::Set(d, 6249), w2 = hn::Set(d, 4295), w3 = hn::Set(d, 2299);
-  const auto half = hn::Set(d, 32);
-  const int step = static_cast<int>(hn::Lanes(d));
-  for (int x = 0; x < width; x += step) {
-    const auto at = [&](int k) HWY_ATTR { return hn::LoadU(d, rows[k] + x); };
-    auto sum = hn::Add(half, hn::MulFixedPoint15(w0, at(3)));
-    sum = hn::Add(sum, hn::MulFixedPoint15(w1, hn::Add(at(2), at(4))));
-    sum = hn::Add(sum, hn::MulFixedPoint15(w2, hn::Add(at(1), at(5))));
-    sum = hn::Add(sum, hn::MulFixedPoint15(w3, hn::Add(at(0), at(6))));
-    hn::StoreU(hn::DemoteTo(d8, hn::ShiftRight<6>(sum)), d8, out + x);
-  }
-}
-
 using V8 = hn::Vec<U8>;
+
+// `at(k)` loads the pixels k steps from the centre, -3 <= k <= 3.
+template <typename At>
+HWY_INLINE V8 blur_vector(const At& at) {
+  const auto fine = [&](int k)
+                        HWY_ATTR { return hn::AverageRound(hn::AverageRound(at(k - 1), at(k + 1)), at(k)); };
+  return hn::AverageRound(hn::AverageRound(fine(-2), fine(2)), fine(0));
+}
+
+void blur_row(const std::uint8_t* HWY_RESTRICT source, int width, std::uint8_t* HWY_RESTRICT out) {
+  const U8 d;
+  const int step = static_cast<int>(hn::Lanes(d));
+  for (int x = 0; x < width; x += step) {
+    hn::StoreU(blur_vector([&](int k) HWY_ATTR { return hn::LoadU(d, source + x + k); }), d, out + x);
+  }
+}
+
+void blur_column(const std::uint8_t* const rows[7], int width, std::uint8_t* HWY_RESTRICT out) {
+  const U8 d;
+  const int step = static_cast<int>(hn::Lanes(d));
+  for (int x = 0; x < width; x += step) {
+    hn::StoreU(blur_vector([&](int k) HWY_ATTR { return hn::LoadU(d, rows[k + 3] + x); }), d, out + x);
+  }
+}
 
 // Scores of one vector of centres. Arcs of nine that start at an even position and at the next one share
 // eight pixels, so the best of both is min(shared, max(first, last)): half the work of sixteen arcs.
@@ -129,16 +124,21 @@ bool fast_score_row(const std::uint8_t* centre_row, std::ptrdiff_t stride, int b
                     std::uint8_t* score) {
   const U8 d;
   const int step = static_cast<int>(hn::Lanes(d));
-  if (end - begin < step)
-    return plain_kernels().fast_score_row(centre_row, stride, begin, end, threshold, score);
   const V8 limit = hn::Set(d, static_cast<std::uint8_t>(threshold));
   V8 any = hn::Zero(d);
-  for (int x = begin;; x += step) {
-    if (x > end - step) x = end - step;  // the last vector overlaps the one before
+  int x = begin;
+  for (; x + step <= end; x += step) {
     const V8 s = fast_score_vector(d, centre_row + x, stride, limit);
     hn::StoreU(s, d, score + x);
     any = hn::Or(any, s);
-    if (x == end - step) break;
+  }
+  if (x < end) {  // part of a vector
+    alignas(64) std::uint8_t rest[kRowAlignment];
+    const V8 inside = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(end - x)),
+                                         fast_score_vector(d, centre_row + x, stride, limit));
+    hn::Store(inside, d, rest);
+    std::copy_n(rest, end - x, score + x);
+    any = hn::Or(any, inside);
   }
   return !hn::AllTrue(d, hn::Eq(any, hn::Zero(d)));
 }
@@ -148,8 +148,8 @@ int maxima_row(const std::uint8_t* above, const std::uint8_t* here, const std::u
   const U8 d;
   const V8 zero = hn::Zero(d);
   const int step = static_cast<int>(hn::Lanes(d));
-  int count = 0, x = begin;
-  for (; x + step <= end; x += step) {
+  int count = 0;
+  for (int x = begin; x < end; x += step) {
     const V8 s = hn::LoadU(d, here + x);
     if (hn::AllTrue(d, hn::Eq(s, zero))) continue;
     const auto max3 = [&](const std::uint8_t* row) HWY_ATTR {
@@ -161,11 +161,9 @@ int maxima_row(const std::uint8_t* above, const std::uint8_t* here, const std::u
     const auto not_above = hn::Eq(hn::SaturatedSub(s, after), zero);
     std::uint64_t bits = 0;
     hn::StoreMaskBits(d, hn::AndNot(not_above, not_below), reinterpret_cast<std::uint8_t*>(&bits));
-    for (; bits != 0; bits &= bits - 1) {
-      out[count++] = static_cast<std::uint16_t>(x + __builtin_ctzll(bits));
-    }
+    if (end - x < 64) bits &= (std::uint64_t{1} << (end - x)) - 1;  // of the last vector, what is inside
+    for (; bits != 0; bits &= bits - 1) out[count++] = static_cast<std::uint16_t>(x + __builtin_ctzll(bits));
   }
-  if (x < end) count += plain_kernels().maxima_row(above, here, below, x, end, out + count);
   return count;
 }
 
@@ -213,18 +211,17 @@ CentroidMoments centroid(const std::uint8_t* centre, std::ptrdiff_t stride) {
   return m;
 }
 
+// Nothing to gain from vectors: four loads a pair are the cost, gathers included.
 void compare_pairs(const std::uint8_t* HWY_RESTRICT patch, const std::uint16_t* HWY_RESTRICT offsets,
                    std::uint64_t bits[4]) {
-  const U8 d;
-  const int step = static_cast<int>(hn::Lanes(d));
-  alignas(64) std::uint8_t first[256], second[256];
-  for (int i = 0; i < 256; ++i) {
-    first[i] = patch[offsets[2 * i]];
-    second[i] = patch[offsets[2 * i + 1]];
-  }
-  auto* bytes = reinterpret_cast<std::uint8_t*>(bits);
-  for (int i = 0; i < 256; i += step) {
-    bytes += hn::StoreMaskBits(d, hn::Lt(hn::Load(d, first + i), hn::Load(d, second + i)), bytes);
+  for (int word = 0; word < 4; ++word) {
+    std::uint64_t b = 0;
+#pragma GCC unroll 8
+    for (int i = 63; i >= 0; --i) {
+      const std::uint16_t* pair = offsets + 2 * (64 * word + i);
+      b = b + b + static_cast<std::uint64_t>(patch[pair[0]] < patch[pair[1]]);
+    }
+    bits[word] = b;
   }
 }
 
