@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace farpoint::slam {
 namespace {
@@ -10,6 +11,18 @@ namespace {
 bool stronger(const Corner& a, const Corner& b) {
   if (a.score != b.score) return a.score > b.score;
   return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+// Moves the corners with coordinate < middle to the front and returns how many. Without a branch on the
+// comparison, which is random and would be mispredicted every other time.
+std::ptrdiff_t split_at(std::span<Corner> corners, int middle, std::uint16_t Corner::*coordinate) {
+  std::size_t front = 0;
+  for (Corner& corner : corners) {
+    const std::size_t before = corner.*coordinate < middle ? 1U : 0U;
+    std::swap(corner, corners[front]);
+    front += before;
+  }
+  return static_cast<std::ptrdiff_t>(front);
 }
 
 }  // namespace
@@ -27,8 +40,7 @@ int select_spread(std::span<Corner> corners, PixelBox box, int quota) {
   const int middle = along_x ? (box.x0 + box.x1) / 2 : (box.y0 + box.y1) / 2;
   (along_x ? low.x1 : low.y1) = middle;
   (along_x ? high.x0 : high.y0) = middle;
-  const auto split = std::partition(corners.begin(), corners.end(),
-                                    [&](const Corner& c) { return (along_x ? c.x : c.y) < middle; });
+  const auto split = corners.begin() + split_at(corners, middle, along_x ? &Corner::x : &Corner::y);
   const std::span<Corner> low_corners(corners.begin(), split), high_corners(split, corners.end());
   const int low_count = static_cast<int>(low_corners.size()),
             high_count = static_cast<int>(high_corners.size());

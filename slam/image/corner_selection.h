@@ -6,11 +6,13 @@
 
 namespace farpoint::slam {
 
-// A corner on its pyramid level.
-struct Corner {
+// A corner on its pyramid level. One machine word, so that moving it is one load and one store.
+struct alignas(8) Corner {
   std::uint16_t x = 0, y = 0;  // level pixels
-  std::uint8_t score = 0;      // FAST score
+  std::uint16_t score = 0;     // FAST score
+  std::uint16_t unused = 0;
 };
+static_assert(sizeof(Corner) == 8);
 
 // Half-open box of level pixels.
 struct PixelBox {

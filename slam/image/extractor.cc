@@ -123,7 +123,7 @@ void Extractor::Workspace::scan(const ImageView& image, float scale, const Image
     for (int i = 0; i < count; ++i) {
       const int x = maxima[static_cast<std::size_t>(i)];
       if (masked(x, centre)) continue;
-      corners->push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(centre), here[x]});
+      corners->push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(centre), here[x], 0});
     }
   }
 }

@@ -94,11 +94,17 @@ HWY_INLINE V8 fast_score_vector(U8 d, const std::uint8_t* HWY_RESTRICT c, std::p
   const V8 zero = hn::Zero(d);
   if (hn::AllTrue(d, hn::Eq(hn::SaturatedSub(bound, threshold), zero))) return zero;
 
-  const V8 p[16] = {
-      p0,  hn::LoadU(d, c - 3 * s + 1), hn::LoadU(d, c - 2 * s + 2), hn::LoadU(d, c - s + 3),
-      p4,  hn::LoadU(d, c + s + 3),     hn::LoadU(d, c + 2 * s + 2), hn::LoadU(d, c + 3 * s + 1),
-      p8,  hn::LoadU(d, c + 3 * s - 1), hn::LoadU(d, c + 2 * s - 2), hn::LoadU(d, c + s - 3),
-      p12, hn::LoadU(d, c - s - 3),     hn::LoadU(d, c - 2 * s - 2), hn::LoadU(d, c - 3 * s - 1)};
+  const V8 p2 = hn::LoadU(d, c - 2 * s + 2), p6 = hn::LoadU(d, c + 2 * s + 2),
+           p10 = hn::LoadU(d, c + 2 * s - 2), p14 = hn::LoadU(d, c - 2 * s - 2);
+  const V8 bright_bound2 = hn::Min(bright_bound, hn::Min(hn::Max(p2, p10), hn::Max(p6, p14)));
+  const V8 dark_bound2 = hn::Max(dark_bound, hn::Max(hn::Min(p2, p10), hn::Min(p6, p14)));
+  const V8 bound2 = hn::Max(hn::SaturatedSub(bright_bound2, centre), hn::SaturatedSub(centre, dark_bound2));
+  if (hn::AllTrue(d, hn::Eq(hn::SaturatedSub(bound2, threshold), zero))) return zero;
+
+  const V8 p[16] = {p0,  hn::LoadU(d, c - 3 * s + 1), p2,  hn::LoadU(d, c - s + 3),
+                    p4,  hn::LoadU(d, c + s + 3),     p6,  hn::LoadU(d, c + 3 * s + 1),
+                    p8,  hn::LoadU(d, c + 3 * s - 1), p10, hn::LoadU(d, c + s - 3),
+                    p12, hn::LoadU(d, c - s - 3),     p14, hn::LoadU(d, c - 3 * s - 1)};
   V8 low2[8], high2[8], low4[8], high4[8];  // element j starts at position 2 j + 1
   for (int j = 0; j < 8; ++j) {
     low2[j] = hn::Min(p[2 * j + 1], p[(2 * j + 2) % 16]);

@@ -23,7 +23,7 @@ std::vector<Corner> make_corners(int count, double left_share, std::uint64_t see
     if (!used.insert({x, y}).second) continue;
     const int score = (left ? 100 : 10) + static_cast<int>(testing::uniform(rng) * 80);
     corners.push_back(
-        {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(score)});
+        {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(score), 0});
   }
   return corners;
 }
@@ -75,7 +75,7 @@ TEST(SelectSpread, WhatARegionCannotUseGoesToOthers) {
 
 TEST(SelectSpread, ASmallRegionKeepsItsStrongest) {
   std::vector<Corner> corners = make_corners(500, 0.5, 4);
-  const std::uint8_t best =
+  const std::uint16_t best =
       std::max_element(corners.begin(), corners.end(), [](const Corner& a, const Corner& b) {
         return a.score < b.score;
       })->score;
