@@ -76,6 +76,16 @@ struct MappingConfig {
   std::string solver = "schur";         // schur | ceres
 };
 
+// Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be trusted.
+struct CalibrationConfig {
+  bool refine = true;
+  double focal_sigma = 0.003;           // relative
+  double centre_sigma_px = 2.0;
+  double distortion_sigma = 0.02;       // of the first radial coefficient
+  double information_share = 0.25;      // residuals are not independent: so much of their information counts
+  int min_keyframes = 8;                // free poses a window must have
+};
+
 struct EstimatorConfig {
   PyramidOptions pyramid;
   ExtractorOptions extractor;
@@ -85,6 +95,7 @@ struct EstimatorConfig {
   KeyframeConfig keyframes;
   LandmarkConfig landmarks;
   MappingConfig mapping;
+  CalibrationConfig calibration;
 };
 
 }  // namespace farpoint::slam

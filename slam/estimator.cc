@@ -104,7 +104,7 @@ struct Estimator::Impl {
         extractor(camera.width_px(), camera.height_px(), config.pyramid, config.extractor),
         pyramids(camera.width_px(), camera.height_px(), config.pyramid),
         initialiser(config, rig),
-        tracker(config, rig),
+        tracker(config),
         mapper(config, rig) {}
 
   const EstimatorConfig config;
@@ -450,6 +450,11 @@ std::vector<SE3> Estimator::keyframe_poses() const {
   std::vector<SE3> out;
   impl_->mapper.map().keyframes().for_each([&](KeyframeHandle, const Keyframe& k) { out.push_back(k.T_world_body); });
   return out;
+}
+
+CalibrationInfo Estimator::calibration() const {
+  const CalibrationDelta d = impl_->mapper.calibrator().delta(), s = impl_->mapper.calibrator().sigma();
+  return {d[0], d[1], d[2], d[3], s[0], s[1], s[2], s[3]};
 }
 
 std::vector<std::pair<std::string, std::size_t>> Estimator::memory_table() const {

@@ -102,6 +102,12 @@ struct LandmarkInfo {
   std::uint64_t tag = 0;              // simulator: which true point the host patch shows; 0 elsewhere
 };
 
+// Camera 0's calibration as refined from the map, relative to the given one; zero where refinement is off.
+struct CalibrationInfo {
+  double focal_scale = 0, cx_px = 0, cy_px = 0, k1 = 0;                           // focal_scale: log of the factor
+  double focal_scale_sigma = 0, cx_sigma_px = 0, cy_sigma_px = 0, k1_sigma = 0;   // 1 sigma
+};
+
 class Estimator {
  public:
   // Allocates everything. Throws std::invalid_argument with a sentence a user can act on where the configuration or
@@ -127,6 +133,7 @@ class Estimator {
   // distance in map units.
   void visit_observation_distances(const std::function<void(std::int32_t map_id, double distance)>& visit) const;
   [[nodiscard]] std::vector<SE3> keyframe_poses() const;
+  [[nodiscard]] CalibrationInfo calibration() const;
   // Bytes of every pool, for the table printed at start.
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory_table() const;
 

@@ -89,17 +89,17 @@ void smooth_patch(const Patch& patch, SmoothPatch* out) {
 }
 
 // Adds value and gradient of the patch at host pixel (x, y), which the caller has checked.
-void sample_patch(const SmoothPatch& patch, float x, float y, float* value, Eigen::Vector2f* gradient) {
-  const int ix = nearest_pixel(x), iy = nearest_pixel(y);
-  const SplineWeights wx = spline(x - static_cast<float>(ix)), wy = spline(y - static_cast<float>(iy));
-  const float* row = patch.data() + (iy - 1) * Patch::kSize + ix - 1;
-  for (int k = 0; k < 3; ++k, row += Patch::kSize) {
-    const float along = wx.value[0] * row[0] + wx.value[1] * row[1] + wx.value[2] * row[2];
-    const float slope = wx.slope[0] * row[0] + wx.slope[1] * row[1] + wx.slope[2] * row[2];
-    *value += wy.value[k] * along;
-    gradient->x() += wy.value[k] * slope;
-    gradient->y() += wy.slope[k] * along;
-  }
+void sample_patch(const SmoothPatch& patch, float x, float y, float* value, float* slope_x, float* slope_y) {
+  // Positions are positive: truncation is the floor.
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const float tx = x - static_cast<float>(ix), ty = y - static_cast<float>(iy);
+  const float* p = patch.data() + iy * Patch::kSize + ix;
+  const float upper = p[0] + tx * (p[1] - p[0]);
+  const float lower = p[Patch::kSize] + tx * (p[Patch::kSize + 1] - p[Patch::kSize]);
+  const float left = p[Patch::kSize] - p[0], right = p[Patch::kSize + 1] - p[1];
+  *value += upper + ty * (lower - upper);
+  *slope_x += (p[1] - p[0]) + ty * (right - left);
+  *slope_y += lower - upper;
 }
 
 // `B` maps an offset in target level pixels to one in host level pixels. False if the template leaves the
@@ -113,23 +113,22 @@ bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
   constexpr float kReach = Patch::kSize - 1.5F - Patch::kCentre;
   if (!((B.cwiseAbs() * Eigen::Vector2f(reach, reach)).maxCoeff() < kReach)) return false;
   SmoothPatch smooth;
+  constexpr float kCentre = Patch::kCentre;
   smooth_patch(patch, &smooth);
   const int samples = fine ? 4 : 1;
   const float share = 1.0F / static_cast<float>(samples);
+  const float bxx = B(0, 0), bxy = B(0, 1), byx = B(1, 0), byy = B(1, 1);
   for (int i = 0; i < kCount; ++i) {
-    const Eigen::Vector2f d(kFirst + static_cast<float>(i % kSide), kFirst + static_cast<float>(i / kSide));
-    float value = 0;
-    Eigen::Vector2f gradient = Eigen::Vector2f::Zero();
+    const float dx = kFirst + static_cast<float>(i % kSide), dy = kFirst + static_cast<float>(i / kSide);
+    float value = 0, slope_x = 0, slope_y = 0;
     for (int s = 0; s < samples; ++s) {
-      const Eigen::Vector2f shift((s & 1) != 0 ? sub : -sub, (s & 2) != 0 ? sub : -sub);
-      const Eigen::Vector2f p = B * (d + shift) + Eigen::Vector2f::Constant(Patch::kCentre);
-      sample_patch(smooth, p.x(), p.y(), &value, &gradient);
+      const float sx = dx + ((s & 1) != 0 ? sub : -sub), sy = dy + ((s & 2) != 0 ? sub : -sub);
+      sample_patch(smooth, kCentre + bxx * sx + bxy * sy, kCentre + byx * sx + byy * sy, &value, &slope_x, &slope_y);
     }
-    const Eigen::Vector2f by_target = B.transpose() * gradient * share;
     const auto index = static_cast<std::size_t>(i);
     t->value[index] = value * share;
-    t->dx[index] = by_target.x();
-    t->dy[index] = by_target.y();
+    t->dx[index] = (bxx * slope_x + byx * slope_y) * share;
+    t->dy[index] = (bxy * slope_x + byy * slope_y) * share;
   }
   return true;
 }

@@ -40,6 +40,8 @@ struct Landmark {
   SE3 T_host_anchor;
   Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();                     // f, unit, anchor axes
   Eigen::Matrix<double, 3, 2> d_bearing_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();    // at the host pixel
+  Eigen::Vector2d host_pixel = Eigen::Vector2d::Zero();   // level-0 pixel of the anchor camera
+  int host_camera = 0;
   double inverse_depth = 0;         // rho >= 0, 1 / distance along f, 1 / map units
   double inverse_depth_sigma = 0;
   double max_parallax_rad = 0;      // largest angle between the host's ray and another observer's

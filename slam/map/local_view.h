@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "slam/config.h"
 #include "slam/map/landmark.h"
 
 namespace farpoint::slam {
@@ -30,6 +31,7 @@ struct ViewKeyframe {
 struct LocalView {
   std::uint64_t sequence = 0;
   std::int32_t map_id = 0;
+  Rig rig;                                  // with the calibration as refined so far
   std::uint64_t reference_id = 0;           // newest keyframe
   SE3 T_world_reference;
   std::vector<ViewKeyframe> keyframes;      // the window, for re-expressing older poses

@@ -78,17 +78,11 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   l.map_id = keyframe.map_id;
   l.host = host;
   l.T_host_anchor = camera.T_body_camera;
-  l.bearing = keyframe.bearings[feature].cast<double>().normalized();
-  for (int axis = 0; axis < 2; ++axis) {
-    // Central difference over one pixel: exact to second order, and the patch spans several pixels anyway.
-    Eigen::Vector2d plus(f.u_px, f.v_px), minus(f.u_px, f.v_px);
-    plus[axis] += 0.5, minus[axis] -= 0.5;
-    Eigen::Vector3d a, b;
-    if (!camera.camera.unproject(plus, &a) || !camera.camera.unproject(minus, &b)) {
-      landmarks_.release(handle);
-      return {};
-    }
-    l.d_bearing_d_pixel.col(axis) = a - b;
+  l.host_camera = keyframe.camera;
+  l.host_pixel = {f.u_px, f.v_px};
+  if (!set_bearing(&l)) {
+    landmarks_.release(handle);
+    return {};
   }
   l.patch = patch;
   l.descriptor = keyframe.set.descriptors[feature];
@@ -97,6 +91,39 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F});
   keyframe.landmarks[feature] = handle;
   return handle;
+}
+
+bool Map::set_bearing(Landmark* l) const {
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(l->host_camera)].camera;
+  Eigen::Vector3d bearing;
+  if (!camera.unproject(l->host_pixel, &bearing)) return false;
+  Eigen::Matrix<double, 3, 2> derivative;
+  for (int axis = 0; axis < 2; ++axis) {
+    // Central difference over one pixel: exact to second order, and the patch spans several pixels anyway.
+    const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
+    Eigen::Vector3d a, b;
+    if (!camera.unproject(l->host_pixel + half, &a) || !camera.unproject(l->host_pixel - half, &b)) return false;
+    derivative.col(axis) = a - b;
+  }
+  l->bearing = bearing;
+  l->d_bearing_d_pixel = derivative;
+  return true;
+}
+
+void Map::set_camera(int index, const Camera& camera) {
+  rig_.cameras[static_cast<std::size_t>(index)].camera = camera;
+  landmarks_.for_each([&](LandmarkHandle, Landmark& l) {
+    // A ray lost at the very edge of the image keeps its old value.
+    if (l.host_camera == index) (void)set_bearing(&l);
+  });
+  keyframes_.for_each([&](KeyframeHandle, Keyframe& k) {
+    if (k.camera != index || !k.image) return;
+    for (std::size_t i = 0; i < k.bearings.size(); ++i) {
+      Eigen::Vector3d bearing;
+      if (camera.unproject({k.set.features[i].u_px, k.set.features[i].v_px}, &bearing))
+        k.bearings[i] = bearing.cast<float>();
+    }
+  });
 }
 
 void Map::detach_feature(const Observation& o) {

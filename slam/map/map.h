@@ -47,6 +47,11 @@ class Map {
   // Angle between the host's ray and the observer's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 
+  // --- calibration ---------------------------------------------------------------------------------------------
+  // Uses a refined calibration from now on: the bearings of landmarks, and of keyframes that still have pixels, are
+  // made anew; poses and inverse depths stay.
+  void set_camera(int index, const Camera& camera);
+
   // --- covisibility --------------------------------------------------------------------------------------------
   // Counts again which keyframes share landmarks with this one, both ways.
   void update_covisibility(KeyframeHandle handle);
@@ -73,6 +78,7 @@ class Map {
     bool known = false;
   };
 
+  bool set_bearing(Landmark* landmark) const;
   void detach_feature(const Observation& observation);
   // Keeps the largest parallax and who gives it.
   void note_parallax(const Observation& observation, Landmark* landmark) const;

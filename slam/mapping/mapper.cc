@@ -17,7 +17,10 @@ constexpr std::uint64_t kProbation_keyframes = 3;
 }  // namespace
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
-    : config_(config), rig_(rig), map_(config.capacity, rig), maker_(config_, &map_, &counts_) {
+    : config_(config),
+      map_(config.capacity, rig),
+      maker_(config_, &map_, &counts_),
+      calibrator_(config.calibration, rig.cameras.front().camera) {
   pose_index_.assign(static_cast<std::size_t>(config.capacity.keyframes), -1);
 }
 
@@ -31,7 +34,7 @@ KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body
   k.set = frame.set;
   k.grid = frame.grid;
   k.image = frame.image;
-  const Camera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)].camera;
+  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(frame.camera)].camera;
   k.bearings.reserve(k.set.features.size());
   for (const Feature& f : k.set.features) {
     Eigen::Vector3d b = Eigen::Vector3d::UnitZ();
@@ -163,6 +166,7 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   fuse_neighbourhood(newest_);
   map_.update_covisibility(newest_);
   optimise(newest_, config_.mapping.iterations);
+  if (config_.calibration.refine) refine_calibration();
   cull_keyframes(newest_);
   limit_memory(newest_);
   map_.update_covisibility(newest_);
@@ -190,7 +194,7 @@ void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
 
 void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks) {
   Keyframe& keyframe = map_.keyframes()[handle];
-  const Camera& camera = rig_.cameras[static_cast<std::size_t>(keyframe.camera)].camera;
+  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
   const SE3 T_camera_world = map_.T_world_camera(keyframe).inverse();
   const double scale_factor = config_.pyramid.scale_factor;
   for (const LandmarkHandle& lh : landmarks) {
@@ -263,7 +267,7 @@ void Mapper::select_window(KeyframeHandle centre) {
 
 void Mapper::build_problem() {
   problem_.clear();
-  problem_.rig = &rig_;
+  problem_.rig = &map_.rig();
   problem_landmarks_.clear();
   fixed_.clear();
   std::fill(pose_index_.begin(), pose_index_.end(), -1);
@@ -345,7 +349,17 @@ void Mapper::optimise(KeyframeHandle centre, int iterations) {
   const BundleSummary summary = config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_)
                                                                   : solve_schur(options, &problem_);
   ++counts_.local_ba;
-  if (summary.usable) take_back();
+  if (!summary.usable) return;
+  take_back();
+}
+
+void Mapper::refine_calibration() {
+  // Poses and depths are at their optimum for the present calibration: what is left in the residuals is noise, or a
+  // calibration that is not quite right.
+  std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size());
+  for (std::size_t i = 0; i < problem_.points.size(); ++i)
+    if (const Landmark* l = map_.landmarks().get(problem_landmarks_[i])) d_bearing[i] = l->d_bearing_d_pixel;
+  if (calibrator_.update(problem_, d_bearing)) map_.set_camera(0, calibrator_.camera());
 }
 
 void Mapper::take_back() {
@@ -460,6 +474,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
   view->reference_id = centre.id;
   view->T_world_reference = centre.T_world_body;
   view->settled = settled_;
+  view->rig = map_.rig();
   std::vector<KeyframeHandle> members{reference};
   std::vector<std::uint8_t> member(map_.keyframes().capacity(), 0);
   member[reference.index] = 1;

@@ -12,6 +12,7 @@
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
 #include "slam/mapping/bundle_problem.h"
+#include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/statistics.h"
 #include "slam/map/frame.h"
@@ -33,6 +34,7 @@ class Mapper {
   [[nodiscard]] const Map& map() const { return map_; }
   [[nodiscard]] Map& map() { return map_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
   [[nodiscard]] std::uint64_t newest_id() const { return newest_id_; }
   void discard_map(std::int32_t map_id) { map_.discard_map(map_id); }
 
@@ -52,6 +54,7 @@ class Mapper {
   void select_window(KeyframeHandle centre);
   void build_problem();
   void take_back();
+  void refine_calibration();
   void update_settling(double scale_change);
 
   void cull_keyframes(KeyframeHandle newest);
@@ -59,10 +62,10 @@ class Mapper {
   std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);
 
   const EstimatorConfig config_;
-  const Rig rig_;
   Map map_;
   MappingCounts counts_;
   LandmarkMaker maker_;
+  Calibrator calibrator_;
 
   KeyframeHandle newest_;
   std::uint64_t newest_id_ = 0;

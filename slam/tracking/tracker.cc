@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#if __has_include("slam/geometry/pnp.h")
 #include "slam/geometry/pnp.h"
-#define HAVE_PNP 1
-#endif
 
 namespace farpoint::slam {
 
@@ -21,7 +18,7 @@ bool scale_fits(float change) { return change > kMinScaleChange && change < kMax
 
 }  // namespace
 
-Tracker::Tracker(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {
+Tracker::Tracker(const EstimatorConfig& config) : config_(config) {
   counts_.resize(static_cast<std::size_t>(config.capacity.landmarks));
   counted_slots_.reserve(counts_.size());
 }
@@ -69,7 +66,7 @@ SE3 Tracker::predict_pose(std::int64_t utime) const {
 
 void Tracker::project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const {
   out->clear();
-  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
   const SE3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
     const ViewLandmark& l = view_->landmarks[i];
@@ -160,7 +157,7 @@ PoseSolution Tracker::pose_from_matches(const Frame& frame, const SE3& start) {
     pm.camera = frame.camera;
     measurements_.push_back(pm);
   }
-  PoseSolution s = solve_pose(rig_, start, measurements_);
+  PoseSolution s = solve_pose(view_->rig, start, measurements_);
   for (std::size_t i = 0; i < matches_.size(); ++i) matches_[i].inlier = measurements_[i].inlier;
   return s;
 }
@@ -228,7 +225,7 @@ TrackOutcome Tracker::fine_pose(const Frame& frame, const SE3& start) {
 
 double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_body) const {
   // Parallax in pixels: where landmarks are now against where rotation alone would have put them.
-  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
   const SE3 T_c_w = (T_world_body * camera.T_body_camera).inverse();
   const Eigen::Vector3d centre = (T_world_body * camera.T_body_camera).t;
   const Eigen::Vector3d reference = (view_->T_world_reference * camera.T_body_camera).t;
@@ -261,7 +258,7 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
   feature_match_.assign(frame.set.features.size(), -1);
   matches_.clear();
   if (!view_) return {};
-  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)];
+  const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
   std::vector<Eigen::Vector3d> bearings, points;
   DescriptorQuery q;
   q.u_px = static_cast<float>(camera.camera.width_px()) / 2;
@@ -281,14 +278,10 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
     bearings.push_back(bearing);
     points.push_back(l.point_w.head<3>() / l.point_w[3]);
   }
-#ifdef HAVE_PNP
   const PnpResult pnp = solve_pnp(bearings, points, 2.0 / camera.camera.focal_px(), PnpOptions{});
   if (!pnp.ok) return {};
   const SE3 T_world_body = (camera.T_body_camera * pnp.T_camera_world).inverse();
   return track_from(frame, T_world_body);
-#else
-  return {};
-#endif
 }
 
 void Tracker::accept(const Frame& frame, const TrackOutcome& outcome, bool continuous) {

@@ -36,7 +36,7 @@ struct TrackOutcome {
 
 class Tracker {
  public:
-  Tracker(const EstimatorConfig& config, const Rig& rig);
+  explicit Tracker(const EstimatorConfig& config);
 
   // Takes a newer view. Pose and motion prior move with the reference keyframe's correction.
   void set_view(std::shared_ptr<const LocalView> view);
@@ -83,7 +83,6 @@ class Tracker {
   [[nodiscard]] double motion_since_reference(const Frame& frame, const SE3& T_world_body) const;
 
   const EstimatorConfig config_;
-  const Rig rig_;
   std::shared_ptr<const LocalView> view_;
 
   SE3 T_world_body_;
