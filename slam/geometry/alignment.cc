@@ -17,9 +17,9 @@ Eigen::Vector3d mean(std::span<const Eigen::Vector3d> points) {
 
 }  // namespace
 
-Alignment align_points(std::span<const Eigen::Vector3d> source, std::span<const Eigen::Vector3d> target,
-                       AlignmentKind kind) {
-  Alignment result;
+PointAlignment align_points(std::span<const Eigen::Vector3d> source, std::span<const Eigen::Vector3d> target,
+                            AlignmentKind kind) {
+  PointAlignment result;
   const size_t n = std::min(source.size(), target.size());
   if (n < 3) return result;
   source = source.first(n);

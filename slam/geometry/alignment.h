@@ -10,7 +10,7 @@ namespace farpoint::slam {
 
 enum class AlignmentKind { kSim3, kSe3 };
 
-struct Alignment {
+struct PointAlignment {
   // False for fewer than three pairs, for numbers that are not finite, and for a sim3 whose source points
   // coincide.
   bool ok = false;
@@ -21,7 +21,7 @@ struct Alignment {
 // Least-squares alignment target[i] ~ S * source[i]: Umeyama, "Least-squares estimation of transformation
 // parameters between two point patterns", PAMI 1991, with the correction that keeps a reflection out. Points
 // on one line leave the turn about it open; any of the equally good solutions is returned then.
-[[nodiscard]] Alignment align_points(std::span<const Eigen::Vector3d> source,
-                                     std::span<const Eigen::Vector3d> target, AlignmentKind kind);
+[[nodiscard]] PointAlignment align_points(std::span<const Eigen::Vector3d> source,
+                                          std::span<const Eigen::Vector3d> target, AlignmentKind kind);
 
 }  // namespace farpoint::slam

@@ -35,7 +35,7 @@ TEST(Alignment, RecoversSimilaritiesAndRigidMotions) {
       source.push_back(centre + p);
       target.push_back(truth * source.back());
     }
-    const Alignment found = align_points(source, target, metric ? AlignmentKind::kSe3 : AlignmentKind::kSim3);
+    const PointAlignment found = align_points(source, target, metric ? AlignmentKind::kSe3 : AlignmentKind::kSim3);
     ASSERT_TRUE(found.ok);
     EXPECT_NEAR(found.S_target_source.scale / truth.scale, 1.0, 1e-10);
     EXPECT_LT((found.S_target_source.q.toRotationMatrix() - truth.q.toRotationMatrix()).norm(), 1e-9);
@@ -52,7 +52,7 @@ TEST(Alignment, NeverReflects) {
       source.push_back(gauss3(rng).cwiseProduct(Eigen::Vector3d(3, 2, 1)));
       target.push_back(source.back().cwiseProduct(Eigen::Vector3d(1, 1, -1)));
     }
-    const Alignment found = align_points(source, target, AlignmentKind::kSim3);
+    const PointAlignment found = align_points(source, target, AlignmentKind::kSim3);
     ASSERT_TRUE(found.ok);
     EXPECT_NEAR(found.S_target_source.q.toRotationMatrix().determinant(), 1.0, 1e-12);
     EXPECT_GT(found.rmse, 0.5);
@@ -82,7 +82,7 @@ TEST(Alignment, AgreesWithTheIndependentChecker) {
     target.emplace_back(2 * std::sin(i) + 0.1 * std::cos(3.0 * i), -2.0 * i + 0.2 * std::sin(5.0 * i),
                         0.2 * i * i + 1);
   }
-  const Alignment sim3 = align_points(source, target, AlignmentKind::kSim3);
+  const PointAlignment sim3 = align_points(source, target, AlignmentKind::kSim3);
   EXPECT_NEAR(sim3.S_target_source.scale, 1.999713428, 1e-8);
   EXPECT_NEAR(sim3.rmse, 0.156674245, 1e-8);
   EXPECT_NEAR(align_points(source, target, AlignmentKind::kSe3).rmse, 5.287298970, 1e-8);
