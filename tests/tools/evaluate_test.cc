@@ -57,7 +57,8 @@ struct MadeRun {
   Trajectory final_trajectory;
   std::size_t first_live = 10;
   std::int8_t scale_state = status_t::SCALE_UNKNOWN;
-  bool ended = true;  // FARPOINT_TRAJECTORY and FARPOINT_SUMMARY are there
+  bool ended = true;           // FARPOINT_TRAJECTORY and FARPOINT_SUMMARY are there
+  bool tracking_timed = true;  // else only the whole frame is
 };
 
 map_summary_t make_map_summary() {
@@ -130,6 +131,8 @@ void write_run_log(const fs::path& file, const MadeRun& run) {
     timing.utime = pose.utime;
     for (double& ms : timing.cpu_ms) ms = -1.0;
     timing.cpu_ms[timing_t::STAGE_TRACKING] = static_cast<double>(i);
+    if (!run.tracking_timed)
+      std::swap(timing.cpu_ms[timing_t::STAGE_TRACKING], timing.cpu_ms[timing_t::STAGE_FRAME]);
     timing.deadline_missed = i == 5 ? 1 : 0;
     log.write_message(ipc::kTimingChannel, pose.utime, timing);
   }
@@ -244,6 +247,23 @@ TEST_F(EvaluateRun, LostRunIsPrintedAsLost) {
   EXPECT_NE(table_text({m}).find("lost"), std::string::npos);
   EXPECT_NE(details_text(m).find("lost"), std::string::npos);
   EXPECT_EQ(to_json(m).find("final.ate_rmse_m")->dump(), "null");
+}
+
+TEST_F(EvaluateRun, TimeOfTheWholeFrameIsNotCalledTracking) {
+  write_recording_log(folder / "truth.lcm", truth, "", {0, 0, 0});
+  MadeRun run;
+  run.final_trajectory = truth;
+  write_run_log(folder / "run.lcm", run);
+  run.tracking_timed = false;
+  write_run_log(folder / "lockstep.lcm", run);
+  const Truth read = read_truth(folder / "truth.lcm");
+  const RunMetrics tracking = evaluate_run(read_run(folder / "run.lcm"), read, {});
+  const RunMetrics frame = evaluate_run(read_run(folder / "lockstep.lcm"), read, {});
+  EXPECT_EQ(to_json(frame).find("tracking_ms")->dump(), "null");
+  EXPECT_NEAR(to_json(frame).find("frame_ms.p50")->number(), 100.0, 1e-9);
+  EXPECT_NE(table_text({tracking}).find(" tracking "), std::string::npos);
+  EXPECT_EQ(table_text({frame}).find(" tracking "), std::string::npos);
+  EXPECT_NE(table_text({frame}).find(" frame "), std::string::npos);
 }
 
 TEST_F(EvaluateRun, PositionOnlyTruthHasNoRotationErrors) {

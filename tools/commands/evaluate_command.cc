@@ -154,6 +154,8 @@ void add_evaluate_command(CLI::App* app, Action* action) {
       "details, then one table with one row a run, the last run's last.\n"
       "  final  every frame's pose after the last optimisation      live  as published when the frame came\n"
       "  share  poses with truth, of all frames of the recording    ATE   RMS position error\n"
+      "  CPU time of tracking: image to pose; of frame, where the run did not measure tracking alone: with "
+      "mapping\n"
       "  RPE    over 100, 200 .. 800 m of path, and over one second (truth interpolated)\n"
       "  depth  when a point was made; distance: over all observations of the final map; metres by the "
       "alignment\n"

@@ -138,6 +138,8 @@ class RunCollector {
     if (!ipc::decode(event.data, &message)) return false;
     const double tracking_ms = message.cpu_ms[timing_t::STAGE_TRACKING];
     if (tracking_ms >= 0.0) log_.tracking_ms.push_back(tracking_ms);
+    const double frame_ms = message.cpu_ms[timing_t::STAGE_FRAME];
+    if (frame_ms >= 0.0) log_.frame_ms.push_back(frame_ms);
     if (message.deadline_missed != 0) ++log_.deadline_misses;
     return true;
   }

@@ -38,6 +38,7 @@ struct RunLog {
   std::int32_t resets = 0;      // highest reset counter published
   std::optional<summary_t> summary;
   std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
+  std::vector<double> frame_ms;     // the same of the whole frame, mapping included where it runs in step
   std::int64_t deadline_misses = 0;
 };
 // Throws InputError where the file cannot be read or holds neither FARPOINT_TRAJECTORY nor FARPOINT_POSE.

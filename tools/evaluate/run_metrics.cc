@@ -193,13 +193,13 @@ Json to_json(const Spread& spread) {
   return json;
 }
 
-Json tracking_to_json(const std::vector<double>& tracking_ms) {
-  if (tracking_ms.empty()) return {};
+Json times_to_json(const std::vector<double>& times_ms) {
+  if (times_ms.empty()) return {};
   Json json = Json::object();
-  json.set("mean", mean(tracking_ms));
-  json.set("p50", percentile(tracking_ms, 50.0));
-  json.set("p99", percentile(tracking_ms, 99.0));
-  json.set("max", *std::max_element(tracking_ms.begin(), tracking_ms.end()));
+  json.set("mean", mean(times_ms));
+  json.set("p50", percentile(times_ms, 50.0));
+  json.set("p99", percentile(times_ms, 99.0));
+  json.set("max", *std::max_element(times_ms.begin(), times_ms.end()));
   return json;
 }
 
@@ -273,7 +273,9 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
   metrics.live_metrics = measured(run.log->live_trajectory);
   metrics.resets = run.log->resets;
   metrics.tracking_ms = run.log->tracking_ms;
-  if (!run.log->tracking_ms.empty()) metrics.deadline_misses = run.log->deadline_misses;
+  metrics.frame_ms = run.log->frame_ms;
+  if (!run.log->tracking_ms.empty() || !run.log->frame_ms.empty())
+    metrics.deadline_misses = run.log->deadline_misses;
   if (run.log->summary) add_summary(*run.log->summary, &metrics);
   return metrics;
 }
@@ -290,7 +292,8 @@ Json to_json(const RunMetrics& metrics) {
   json.set("resets", or_null(metrics.resets));
   json.set("times_lost", or_null(metrics.times_lost));
   json.set("maps", or_null(metrics.maps));
-  json.set("tracking_ms", tracking_to_json(metrics.tracking_ms));
+  json.set("tracking_ms", times_to_json(metrics.tracking_ms));
+  json.set("frame_ms", times_to_json(metrics.frame_ms));
   json.set("deadline_misses", or_null(metrics.deadline_misses));
   json.set("triangulation_depth_m", metrics.depth ? to_json(metrics.depth->triangulation_m) : Json());
   json.set("depth_over_50_m_percent", metrics.depth ? Json(metrics.depth->over_50_m_percent) : Json());

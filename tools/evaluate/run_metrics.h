@@ -98,7 +98,9 @@ struct RunMetrics {
   // From an output log only.
   std::optional<double> tracked_percent;  // frames published with a valid pose
   std::optional<std::int64_t> resets, times_lost, maps;
-  std::vector<double> tracking_ms;
+  std::vector<double>
+      tracking_ms;               // thread CPU time of tracking; empty where the run did not measure it alone
+  std::vector<double> frame_ms;  // of a whole frame: in lockstep, tracking and mapping
   std::optional<std::int64_t> deadline_misses;
   std::optional<DepthMetrics> depth;
   std::optional<std::int64_t> map_points;
