@@ -15,8 +15,8 @@ constexpr double kHuber = 2.4477;      // its root
 // variance 19 % larger than the normal equations say: of 2D normal residuals it keeps 95 % of the information
 // but, of the pull that holds the pose, only 80 %; variance 1 / 0.80 against 1 / 0.95.
 constexpr double kChi2Used = 13.816;
-// A measurement that does not project costs as one of 100 sigmas does: a pose that sees nothing must not win.
-constexpr double kLostCost = kHuber * (100.0 - 0.5 * kHuber);
+// A measurement that does not project costs as one of 1000 sigmas does: a pose that sees nothing must not win.
+constexpr double kLostCost = kHuber * (1000.0 - 0.5 * kHuber);
 constexpr int kIterations = 8;
 
 // What the measurements of one camera share at one pose.
