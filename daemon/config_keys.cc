@@ -70,6 +70,11 @@ ConfigKey enumeration(const char* name, const std::vector<std::string>& choices,
   return key;
 }
 
+template <typename Field>
+ConfigKey boolean(const char* name, Field field) {
+  return enumeration(name, {"false", "true"}, field);
+}
+
 // A function object that gives the named field, const or not like the configuration.
 #define FIELD(path)      \
   [](auto& c) -> auto& { \
@@ -144,6 +149,13 @@ std::vector<ConfigKey> make_keys() {
       integer("mapping.full_view_delay_frames", "frames", 1, 1000,
               FIELD(estimator.mapping.full_view_delay_frames)),
       choice("mapping.solver", {"schur", "ceres"}, FIELD(estimator.mapping.solver)),
+
+      boolean("calibration.refine", FIELD(estimator.calibration.refine)),
+      number("calibration.focal_sigma", "", 1e-6, 0.5, FIELD(estimator.calibration.focal_sigma)),
+      number("calibration.centre_sigma_px", "px", 1e-3, 200, FIELD(estimator.calibration.centre_sigma_px)),
+      number("calibration.distortion_sigma", "", 1e-6, 1, FIELD(estimator.calibration.distortion_sigma)),
+      number("calibration.information_share", "", 1e-4, 1, FIELD(estimator.calibration.information_share)),
+      integer("calibration.min_keyframes", "keyframes", 2, 1000, FIELD(estimator.calibration.min_keyframes)),
   };
 }
 

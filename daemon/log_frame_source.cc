@@ -14,7 +14,9 @@ drivers::LogSource open_source(const std::string& path) {
   try {
     return drivers::LogSource(path);
   } catch (const std::runtime_error& error) {
-    throw InputError(error.what());
+    const std::string what = error.what();
+    const bool says = what.find("expected") != std::string::npos;
+    throw InputError(what + (says ? "" : ", expected the name of an LCM log"));
   }
 }
 

@@ -64,6 +64,11 @@ void StageClock::end(int stage) {
   add_ms(wall_began_s_.at(i), steady_s(), &wall_ms_.at(i));
 }
 
+void StageClock::copy(int same_as, int stage) {
+  cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms(same_as);
+  wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms(same_as);
+}
+
 timing_t StageClock::message(std::int64_t utime, std::int64_t sequence) const {
   timing_t m{};
   m.utime = utime;

@@ -30,6 +30,8 @@ class StageClock {
   // `stage` is one of timing_t::STAGE_*.
   void begin(int stage);
   void end(int stage);
+  // `stage` took what `same_as` took.
+  void copy(int same_as, int stage);
 
   // Negative where the stage did not run in this frame.
   [[nodiscard]] double cpu_ms(int stage) const { return cpu_ms_.at(static_cast<std::size_t>(stage)); }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iomanip>
 #include <sstream>
 
 namespace farpoint::daemon {
@@ -89,7 +90,9 @@ TEST(ConfigKeys, EachKeySetsItsOwnFieldOnly) {
     if (key.type == KeyType::kChoice) {
       other = key.get(config) == key.choices.front() ? key.choices.back() : key.choices.front();
     } else if (key.type != KeyType::kText) {
-      other = std::to_string(static_cast<long long>(key.max));
+      std::ostringstream most;
+      most << std::setprecision(15) << key.max;
+      other = most.str();
     }
     ConfigOrigins origins;
     apply_setting(key.name + "=" + other, &config, &origins);
