@@ -40,6 +40,14 @@ void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& 
   spdlog::info("memory {:<32} {:>9.3f} MB", "in all", double(sum) / kMegabyte);
 }
 
+void print_calibration(const slam::CalibrationInfo& c) {
+  spdlog::info(
+      "calibration found: focal length {:+.2f} +- {:.2f} %, centre {:+.2f} +- {:.2f}, {:+.2f} +- {:.2f} px, "
+      "k1 {:+.5f} +- {:.5f}, against the given one",
+      100.0 * std::expm1(c.focal_scale), 100.0 * c.focal_scale_sigma, c.cx_px, c.cx_sigma_px, c.cy_px,
+      c.cy_sigma_px, c.k1, c.k1_sigma);
+}
+
 }  // namespace
 
 Session::Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
@@ -90,6 +98,7 @@ const FrameOutput& Session::process(const slam::FrameInput& input, const InputCo
 
 const RunEnd& Session::finish(const InputCounts& in) {
   estimator_.finish();
+  if (config_.estimator.calibration.refine) print_calibration(estimator_.calibration());
   end_.counts = estimator_.counts();
   end_.trajectories = estimator_.trajectories();
   end_.landmarks = estimator_.landmarks();

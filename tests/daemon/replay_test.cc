@@ -445,7 +445,9 @@ void expect_repeatable(const test::Scratch& scratch, const std::string& log) {
 
 TEST(Determinism, SyntheticLog) {
   const test::Scratch scratch;
-  test::write_synthetic_log(scratch.path("run.lcm"), {});
+  SyntheticLog log;
+  log.frames = 40;
+  test::write_synthetic_log(scratch.path("run.lcm"), log);
   expect_repeatable(scratch, scratch.path("run.lcm"));
 }
 
