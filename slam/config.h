@@ -72,7 +72,7 @@ struct MappingConfig {
   int fixed_keyframes = 40;             // historical observers held fixed
   int iterations = 8;                   // LM steps, never a time limit
   int quick_view_delay_frames = 1;      // lockstep: triangulation is visible so many frames after the keyframe
-  int full_view_delay_frames = 3;       // lockstep: local BA is visible so many frames after the keyframe
+  int full_view_delay_frames = 2;       // lockstep: local BA is visible so many frames after the keyframe
   std::string solver = "schur";         // schur | ceres
 };
 

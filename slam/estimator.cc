@@ -190,7 +190,7 @@ struct Estimator::Impl {
         const SE3 before = tracker.T_world_body();
         const bool first = tracker.view() == nullptr;
         tracker.set_view(pending.front().view);
-        settled = settled || tracker.view()->settled;
+        settled = tracker.view()->settled;
         // The pose moved with its keyframe: the jump belongs to map_from_odom, not to odom.
         if (has_last && !first) T_map_body_last = tracker.T_world_body() * (before.inverse() * T_map_body_last);
       }

@@ -294,7 +294,11 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
 }
 
 bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
-  if (config_.landmarks.mode == LandmarkMode::kBaseline) return l.max_parallax_rad > config_.landmarks.promote_parallax_rad;
+  const bool wide = l.max_parallax_rad > config_.landmarks.promote_parallax_rad;
+  if (config_.landmarks.mode == LandmarkMode::kBaseline) return wide;
+  // Two views alone cannot tell a mismatch along the epipolar line from depth: short of the wide angle a third must
+  // agree.
+  if (l.observations.size() < 3) return wide;
   return fit.sigma < config_.landmarks.promote_relative_sigma * fit.inverse_depth;
 }
 

@@ -397,11 +397,32 @@ void Mapper::take_back() {
 
 void Mapper::update_settling(double scale_change) {
   // The unit of a young map follows its first baseline, which is known worst of all. It has settled when three
-  // optimisations in a row moved it by less than two per cent each.
+  // optimisations in a row moved it by less than two per cent each, and left residuals that the measurements' errors
+  // explain.
   constexpr double kSteady = 0.02;
   constexpr int kSteadyOptimisations = 3;
-  steady_optimisations_ = std::fabs(std::log(scale_change)) < kSteady ? steady_optimisations_ + 1 : 0;
+  const bool steady = std::fabs(std::log(scale_change)) < kSteady;
+  if (!consistent()) {
+    // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its poses are
+    // not what they claim, however many inliers they have.
+    settled_ = false;
+    steady_optimisations_ = 0;
+    return;
+  }
+  steady_optimisations_ = steady ? steady_optimisations_ + 1 : 0;
   if (steady_optimisations_ >= kSteadyOptimisations) settled_ = true;
+}
+
+bool Mapper::consistent() const {
+  // Mean chi-square of a measurement (two degrees of freedom), outliers cut off. The floor of an aligned measurement's
+  // sigma (tracking.pixel_sigma_px) is about twice the error seen on rigid scenes with a global shutter, so that a
+  // sound map shows 0.4 to 0.9; one that rolling shutter has bent shows 1.5 to 3.
+  constexpr double kCutOff = 20.0;
+  constexpr double kConsistent = 1.2;
+  if (problem_.measurements.empty()) return true;
+  double sum = 0.0;
+  for (const BundleProblem::Measurement& m : problem_.measurements) sum += std::min(m.chi2, kCutOff);
+  return sum < kConsistent * static_cast<double>(problem_.measurements.size());
 }
 
 // ------------------------------------------------------------------------------------------------------- forgetting

@@ -56,6 +56,7 @@ class Mapper {
   void take_back();
   void refine_calibration();
   void update_settling(double scale_change);
+  [[nodiscard]] bool consistent() const;
 
   void cull_keyframes(KeyframeHandle newest);
   void limit_memory(KeyframeHandle newest);

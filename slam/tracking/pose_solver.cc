@@ -15,7 +15,8 @@ constexpr double kHuber = 2.4477;      // its root
 // variance 19 % larger than the normal equations say: of 2D normal residuals it keeps 95 % of the information
 // but, of the pull that holds the pose, only 80 %; variance 1 / 0.80 against 1 / 0.95.
 constexpr double kChi2Used = 13.816;
-// A measurement that does not project costs as one of 1000 sigmas does: a pose that sees nothing must not win.
+// A measurement that does not project costs as one of 1000 sigmas does: a pose that sees nothing must not
+// win.
 constexpr double kLostCost = kHuber * (1000.0 - 0.5 * kHuber);
 constexpr int kIterations = 8;
 
@@ -124,7 +125,8 @@ SE3 descend(const Rig& rig, SE3 T, std::span<const PoseMeasurement> measurements
     damped.diagonal() *= 1.0 + lambda;
     damped.diagonal().array() += 1e-9;
     const Vector6d step = damped.ldlt().solve(-n.g);
-    if (!step.allFinite()) break;
+    // The step foretells what it gains; where that is nothing, the trial would only cost time.
+    if (!step.allFinite() || -n.g.dot(step) < 2e-6 * n.cost) break;
     const SE3 candidate = T.boxplus(step);
     const Normal next = accumulate(rig, candidate, measurements);
     if (next.cost < n.cost) {
@@ -141,21 +143,28 @@ SE3 descend(const Rig& rig, SE3 T, std::span<const PoseMeasurement> measurements
   return T;
 }
 
-// Marks what lies below the gate; returns how many, and their rms.
-int classify(const Rig& rig, const SE3& T, double gate, std::span<PoseMeasurement> measurements,
-             double* rms) {
+struct Sorted {
   int inliers = 0;
+  double rms = 0;        // theirs, in sigmas
+  bool changed = false;  // some measurement changed sides
+};
+
+// Marks what lies below the gate.
+Sorted classify(const Rig& rig, const SE3& T, double gate, std::span<PoseMeasurement> measurements) {
+  Sorted out;
   double sum = 0;
   Views views(rig, T);
   for (PoseMeasurement& m : measurements) {
     Whitened w;
-    m.inlier = whiten(views.of(m.camera), m, &w) && w.r.squaredNorm() < gate;
-    if (!m.inlier) continue;
-    ++inliers;
+    const bool inlier = whiten(views.of(m.camera), m, &w) && w.r.squaredNorm() < gate;
+    out.changed = out.changed || inlier != m.inlier;
+    m.inlier = inlier;
+    if (!inlier) continue;
+    ++out.inliers;
     sum += w.r.squaredNorm();
   }
-  *rms = inliers > 0 ? std::sqrt(sum / (2.0 * inliers)) : 0.0;
-  return inliers;
+  out.rms = out.inliers > 0 ? std::sqrt(sum / (2.0 * out.inliers)) : 0.0;
+  return out;
 }
 
 }  // namespace
@@ -174,12 +183,17 @@ PoseSolution solve_pose(const Rig& rig, const SE3& start, std::span<PoseMeasurem
   s.T_world_body = start;
   for (int round = 0; round < rounds; ++round) {
     s.T_world_body = descend(rig, s.T_world_body, measurements);
-    s.inliers = classify(rig, s.T_world_body, kChi2Used, measurements, &s.rms);
-    if (s.inliers < kFewest) return s;
+    const Sorted used = classify(rig, s.T_world_body, kChi2Used, measurements);
+    s.inliers = used.inliers;
+    s.rms = used.rms;
+    if (used.inliers < kFewest) return s;
+    if (!used.changed) break;
   }
   const Normal n = accumulate(rig, s.T_world_body, measurements);
-  s.inliers = classify(rig, s.T_world_body, kChi2Inlier, measurements, &s.rms);
-  if (s.inliers < kFewest) return s;
+  const Sorted last = classify(rig, s.T_world_body, kChi2Inlier, measurements);
+  s.inliers = last.inliers;
+  s.rms = last.rms;
+  if (last.inliers < kFewest) return s;
   const Eigen::LDLT<Matrix6d> factor(n.H);
   s.covariance = factor.solve(Matrix6d::Identity());
   s.ok =

@@ -27,9 +27,10 @@ struct PoseSolution {
   bool ok = false;
 };
 
-// Levenberg-Marquardt with Huber weights, in rounds; after each round measurements are sorted into inliers and
-// outliers anew. The covariance of a residual is sigma^2 I + J_rho J_rho' sigma_rho^2: what the landmark's depth leaves
-// open along its epipolar line does not pull the pose.
+// Levenberg-Marquardt with Huber weights, in at most so many rounds; after each round it is decided anew which
+// measurements take part (chi-square below the 99.9 % quantile), and when none changes sides it is done. The
+// covariance of a residual is sigma^2 I + J_rho J_rho' sigma_rho^2: what the landmark's depth leaves open along its
+// epipolar line does not pull the pose.
 [[nodiscard]] PoseSolution solve_pose(const Rig& rig, const SE3& T_world_body_start,
                                       std::span<PoseMeasurement> measurements, int rounds = 4);
 
