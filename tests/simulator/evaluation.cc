@@ -111,7 +111,7 @@ double RunReport::vmp_share() const {
 RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::EstimatorConfig& config, const FrameHook& hook) {
   RunReport report;
   Simulator simulator(scene, seed);
-  slam::Estimator estimator(config, scene.rig());
+  slam::Estimator estimator(config, scene.believed_rig());
   struct Live {
     std::int32_t map_id;
     std::uint32_t frame;

@@ -117,6 +117,13 @@ slam::Rig Scene::rig() const {
   return out;
 }
 
+slam::Rig Scene::believed_rig() const {
+  Scene believed = *this;
+  believed.camera.fx_px *= 1.0 + focal_error;
+  believed.camera.fy_px *= 1.0 + focal_error;
+  return believed.rig();
+}
+
 slam::EstimatorConfig Scene::estimator(slam::LandmarkMode mode) const {
   slam::EstimatorConfig config;
   config.extractor.features = features;

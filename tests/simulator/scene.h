@@ -13,6 +13,9 @@ namespace farpoint::sim {
 struct NoiseConfig {
   double corner_sigma_px = 0.5;         // of a corner, in pixels of its level, before it snaps to a whole one
   double align_sigma_px = 0.2;          // of an aligned patch, in pixels of the level it is aligned on
+  // What real patches do when their size changes: a bias that stays the same for one host patch, so many level pixels (1
+  // sigma) for a change by e. Not part of the reported sigma.
+  double align_bias_px = 0.0;
   double align_failure = 0.04;          // an alignment that gives up although the point is there
   double alike_alignment = 0.5;         // a patch that settles on a point that looks alike
   double detection = 0.85;              // a visible corner is found
@@ -33,6 +36,7 @@ struct Scene {
   double rate_hz = 10;
   int frames = 300;
   int features = 600;                   // corners a frame
+  double focal_error = 0.0;             // the estimator believes in a focal length larger by this share
   Motion motion = Motion::kVehicle;
   double speed_m_s = 10;
   std::vector<Path::Segment> path;
@@ -43,6 +47,8 @@ struct Scene {
   bool far = true;                      // has points far enough for virtual map points to matter
 
   [[nodiscard]] slam::Rig rig() const;
+  // As the estimator is told.
+  [[nodiscard]] slam::Rig believed_rig() const;
   // The estimator as it is shipped, for this camera and number of corners.
   [[nodiscard]] slam::EstimatorConfig estimator(slam::LandmarkMode mode) const;
 };

@@ -1,5 +1,6 @@
 // Virtual map points against the baseline over simulated scenes, paired seed by seed.
-//   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--markdown] [--verbose]
+//   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--init-parallax RAD]
+//               [--align-bias PX] [--focal-error SHARE] [--markdown] [--verbose]
 // The figures in the README come from `sim_compare --seeds 20 --scene all --markdown`.
 #include <cmath>
 #include <cstdio>
@@ -20,6 +21,8 @@ struct Options {
   std::string scene = "all";
   int frames = 0;      // 0: the scene's own
   int features = 0;
+  double init_parallax_rad = 0;    // 0: the configuration's
+  double align_bias_px = 0, focal_error = 0;
   bool markdown = false, verbose = false;
 };
 
@@ -45,13 +48,19 @@ Options parse(int argc, char** argv) {
       o.frames = std::atoi(value());
     else if (key == "--features")
       o.features = std::atoi(value());
+    else if (key == "--init-parallax")
+      o.init_parallax_rad = std::atof(value());
+    else if (key == "--align-bias")
+      o.align_bias_px = std::atof(value());
+    else if (key == "--focal-error")
+      o.focal_error = std::atof(value());
     else if (key == "--markdown")
       o.markdown = true;
     else if (key == "--verbose")
       o.verbose = true;
     else
       throw std::invalid_argument(key + ": unknown; expected --seeds, --first, --scene, --frames, --features, "
-                                        "--markdown or --verbose");
+                                        "--init-parallax, --align-bias, --focal-error, --markdown or --verbose");
   }
   if (o.seeds < 1) throw std::invalid_argument("--seeds: at least 1 was expected");
   return o;
@@ -121,12 +130,18 @@ void add(const RunReport& r, int mode, Row* row) {
 // Compared only where both have most of the drive in one map.
 constexpr double kEnoughPosed = 0.9;
 
+slam::EstimatorConfig configuration(const Options& o, const Scene& scene, slam::LandmarkMode mode) {
+  slam::EstimatorConfig config = scene.estimator(mode);
+  if (o.init_parallax_rad > 0.0) config.initialisation.min_parallax_rad = o.init_parallax_rad;
+  return config;
+}
+
 Row compare(const Options& o, const Scene& scene) {
   Row row;
   for (int i = 0; i < o.seeds; ++i) {
     const std::uint64_t seed = o.first + static_cast<std::uint64_t>(i);
-    const RunReport baseline = run_scene(scene, seed, scene.estimator(slam::LandmarkMode::kBaseline));
-    const RunReport vmp = run_scene(scene, seed, scene.estimator(slam::LandmarkMode::kVmp));
+    const RunReport baseline = run_scene(scene, seed, configuration(o, scene, slam::LandmarkMode::kBaseline));
+    const RunReport vmp = run_scene(scene, seed, configuration(o, scene, slam::LandmarkMode::kVmp));
     if (o.verbose) print_run("baseline", seed, baseline), print_run("vmp", seed, vmp);
     add(baseline, 0, &row), add(vmp, 1, &row);
     const double enough = kEnoughPosed * scene.frames;
@@ -170,6 +185,8 @@ int run(const Options& o) {
     Scene scene = make_scene(name);
     if (o.frames > 0) scene.frames = o.frames;
     if (o.features > 0) scene.features = o.features;
+    scene.noise.align_bias_px = o.align_bias_px;
+    scene.focal_error = o.focal_error;
     print_row(o, name, compare(o, scene));
   }
   return 0;

@@ -85,7 +85,11 @@ slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& 
   if (p == nullptr || fails) return out;
   const double sigma = options_.noise.align_sigma_px * static_cast<double>(scale);
   const double noise_u = sigma * draw.normal(), noise_v = sigma * draw.normal();
-  out.pixel = p->pixel + offset + Eigen::Vector2f(static_cast<float>(noise_u), static_cast<float>(noise_v));
+  SightingDraw host_draw(combine({options_.seed, payload.point, payload.frame, 0xb1a5ULL}));
+  const double bias = options_.noise.align_bias_px * static_cast<double>(scale) * std::log(size / host_scale);
+  const double bias_u = bias * host_draw.normal(), bias_v = bias * host_draw.normal();
+  out.pixel = p->pixel + offset +
+              Eigen::Vector2f(static_cast<float>(noise_u + bias_u), static_cast<float>(noise_v + bias_v));
   const float border = kAlignBorder_px * scale;
   if (out.pixel.x() < border || out.pixel.y() < border ||
       out.pixel.x() > static_cast<float>(options_.width_px - 1) - border ||
