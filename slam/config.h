@@ -37,7 +37,7 @@ struct CapacityConfig {
 };
 
 struct InitialisationConfig {
-  double min_parallax_rad = 0.0175;     // median over the landmarks made: about one degree
+  double min_parallax_rad = 0.0175;     // a quarter of the points must show it: one degree
   int min_landmarks = 80;               // good points two views must give
   double max_frames = 30;               // reference is renewed after so many frames
 };

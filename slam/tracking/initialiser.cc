@@ -13,6 +13,9 @@ namespace {
 // one found it.
 constexpr float kFirstWindow = 0.08F;
 constexpr int kMinMatches = 80;
+// Descriptors find a tenth of the corners again in any picture of the same kind: below this share chance matches
+// prevail.
+constexpr double kMinMatchShare = 0.2;
 constexpr double kCornerSigma_px = 1.0;    // corners are not aligned yet
 constexpr std::size_t kHistoryFrames = 60;
 
@@ -83,7 +86,13 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
     used.push_back(p);
   }
   const TwoViewResult r = estimate_two_view(first, second, kCornerSigma_px / camera.camera.focal_px());
-  if (r.status != TwoViewStatus::kOk || r.median_parallax_rad < config_.initialisation.min_parallax_rad) return {};
+  if (r.status != TwoViewStatus::kOk) return {};
+  // A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough.
+  const auto wide = std::count_if(r.parallax_rad.begin(), r.parallax_rad.end(), [&](const double& p) {
+    return p > config_.initialisation.min_parallax_rad && r.inlier[static_cast<std::size_t>(&p - r.parallax_rad.data())] != 0;
+  });
+  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks, static_cast<std::ptrdiff_t>(r.inliers / 4)))
+    return {};
   InitialPair pair;
   pair.first = reference_;
   pair.second = frame;
@@ -108,12 +117,18 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
   match(*frame, &pairs_);
   last_matches_ = static_cast<int>(pairs_.size());
   const auto age = frame->number - reference_->number;
-  if (last_matches_ < kMinMatches || static_cast<double>(age) > config_.initialisation.max_frames) {
-    // The reference has gone out of sight: a frame half way is the next one, matched anew.
+  const std::size_t fewer = std::min(reference_->set.features.size(), frame->set.features.size());
+  const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * static_cast<double>(fewer)));
+  if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
+    // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well, or there is
+    // none, this one.
     const std::uint64_t half = reference_->number + (age + 1) / 2;
     const auto next = std::find_if(history_.begin(), history_.end(),
                                    [&](const std::shared_ptr<Frame>& f) { return f->number >= half; });
-    set_reference(next != history_.end() && last_matches_ >= kMinMatches ? *next : frame);
+    set_reference(next != history_.end() && age > 1 ? *next : frame);
+    match(*frame, &pairs_);
+    last_matches_ = static_cast<int>(pairs_.size());
+    if (last_matches_ < wanted) set_reference(frame);
     return {};
   }
   return solve(frame, pairs_);
