@@ -60,8 +60,8 @@ struct KeyframeConfig {
 
 struct LandmarkConfig {
   LandmarkMode mode = LandmarkMode::kVmp;
-  double promote_parallax_rad = 0.020;  // baseline: acos(0.9998), ORB-SLAM's
-  double promote_relative_sigma = 0.15; // vmp: sigma(inverse depth) / inverse depth
+  double promote_parallax_rad = 0.020;  // largest parallax must be above it: acos(0.9998), as in the paper
+  double promote_relative_sigma = 0.3;   // sigma(inverse depth) / inverse depth must be below it
   int max_bearing = 4000;               // candidates alive at once
 };
 
