@@ -21,7 +21,7 @@ constexpr int kSide = 8;  // template side, target level pixels
 constexpr int kCount = kSide * kSide;
 constexpr float kFirst = -(kSide - 1) / 2.0F;  // offset of the first template pixel from its centre
 constexpr int kMaxIterations = 10;
-constexpr float kConverged = 0.01F;  // level pixels: a tenth of the best measurement's error
+constexpr float kConverged = 0.02F;  // level pixels; what is left after such a step is a fraction of it
 constexpr float kMaxStep = 1.0F;     // level pixels an iteration: the linearisation holds no further
 // Beyond this the patch and the image differ too much in resolution for each other even at the best level.
 constexpr float kMaxScale = 2.2F;
@@ -240,6 +240,28 @@ bool normalise(Template* t, Normalised* n) {
   return true;
 }
 
+// What one iteration needs of a window: its energy about its mean, and its products with the template.
+struct Products {
+  float energy, along, dx, dy;
+};
+
+// In one pass. The template's parts have zero mean, so that the window's own mean drops out of the products.
+Products multiply(const Window& window, const Normalised& n) {
+  Float4 total = {}, square = {}, along = {}, dx = {}, dy = {};
+  // About some grey level in the middle: the squares then keep their digits.
+  const Float4 reference = Float4{} + window[kCount / 2];
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    const Float4 v = load4(&window[i]) - reference;
+    total += v;
+    square += v * v;
+    along += v * load4(&n.unit[i]);
+    dx += v * load4(&n.dx[i]);
+    dy += v * load4(&n.dy[i]);
+  }
+  const float mean_part = sum(total);
+  return {sum(square) - mean_part * mean_part / kCount, sum(along), sum(dx), sum(dy)};
+}
+
 float largest_eigenvalue(const Eigen::Matrix2f& m) {
   const float mean = 0.5F * (m(0, 0) + m(1, 1)), half = 0.5F * (m(0, 0) - m(1, 1));
   return mean + std::sqrt(half * half + m(0, 1) * m(0, 1));
@@ -298,20 +320,18 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   bool converged = false;
   for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
     if (!sample_window(image, p.x(), p.y(), &window)) return result;
-    subtract_mean(&window);
-    const float along = dot(window, host_template.unit), energy = dot(window, window);
-    gain = along / host_template.norm;
-    result.zncc = energy > 0 ? along / std::sqrt(energy) : 0;
+    const Products product = multiply(window, host_template);
+    gain = product.along / host_template.norm;
+    result.zncc = product.energy > 0 ? product.along / std::sqrt(product.energy) : 0;
     // A start half a texture period away shows no or negative correlation: there is no way down from here.
     if (!(result.zncc > 0.1F)) return result;
-    const Eigen::Vector2f slope(dot(window, host_template.dx), dot(window, host_template.dy));
-    Eigen::Vector2f step = host_template.inverse_hessian * slope / gain;
+    Eigen::Vector2f step = host_template.inverse_hessian * Eigen::Vector2f(product.dx, product.dy) / gain;
     const float length = step.norm();
     if (length > kMaxStep) step *= kMaxStep / length;
     p -= step;
     if (!((p - start).squaredNorm() * scale * scale <= max_shift_px * max_shift_px)) return result;
     converged = length < kConverged;
-    variance = (energy - along * along) / (kCount - 4);
+    variance = (product.energy - product.along * product.along) / (kCount - 4);
   }
   const float noise = std::max(variance, kMinNoise * kMinNoise);
   const Eigen::Matrix2f covariance =
