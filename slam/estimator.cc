@@ -77,6 +77,8 @@ struct PendingView {
   std::shared_ptr<const LocalView> view;
 };
 
+// A pose that a third of the matched landmarks contradict is published, but not as valid. Rigid scenes show 0.7 and more.
+constexpr double kMinAgreement = 0.65;
 // Frames of trying to find the way back before a new map is begun.
 constexpr int kRelocalisationFrames = 15;
 // A map this young is dropped rather than kept when it is lost: its unit has not settled.
@@ -242,7 +244,8 @@ struct Estimator::Impl {
     ++frames_since_keyframe;
     maybe_keyframe(frame, outcome);
     if (settled && !waiting.empty()) pose_waiting();
-    if (!settled)
+    const bool agreed = outcome.inliers >= kMinAgreement * outcome.matches;
+    if (!settled || !agreed)
       state = State::kSettling;
     else
       state = outcome.inliers < config.tracking.degraded_inliers ? State::kDegraded : State::kTracking;

@@ -13,13 +13,20 @@ namespace farpoint::slam {
 inline constexpr int kDescriptorPairs = 256;
 extern const std::int8_t kDescriptorPattern[kDescriptorPairs][4];
 
-// The pattern turned to each of kAngleBins angles, as offsets into the compact patch (kPatchStrideBytes).
+// Angles are rounded to one of so many.
+inline constexpr int kAngleBins = 128;
+// The bin nearest to angle_rad, -pi..pi.
+[[nodiscard]] int angle_bin(float angle_rad);
+// Where pattern point (x, y) lies in the compact patch (kPatchStrideBytes) of a corner with an angle of that
+// bin.
+[[nodiscard]] std::uint16_t steered_offset(int x, int y, int bin);
+
+// The pattern turned to each of the angles, as offsets into the compact patch.
 class SteeredPattern {
  public:
-  static constexpr int kAngleBins = 128;
   SteeredPattern();
-  // 2 * kDescriptorPairs offsets for the bin nearest to angle_rad (-pi..pi).
-  [[nodiscard]] const std::uint16_t* offsets(float angle_rad) const;
+  // 2 * kDescriptorPairs offsets.
+  [[nodiscard]] const std::uint16_t* offsets(float angle_rad) const { return offsets_[angle_bin(angle_rad)]; }
 
  private:
   alignas(64) std::uint16_t offsets_[kAngleBins][2 * kDescriptorPairs];

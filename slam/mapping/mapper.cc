@@ -13,6 +13,9 @@ namespace {
 // A landmark on probation goes when it was found in fewer than this share of the frames that should have shown it.
 constexpr double kMinFoundShare = 0.25;
 constexpr std::uint64_t kProbation_keyframes = 3;
+// After residuals that nothing explains, so many sound optimisations in a row before poses are called valid again, in a
+// new map too: what bent the one is there in the other.
+constexpr int kTrustedRun = 10;
 
 }  // namespace
 
@@ -20,7 +23,8 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
       map_(config.capacity, rig),
       maker_(config_, &map_, &counts_),
-      calibrator_(config.calibration, rig.cameras.front().camera) {
+      calibrator_(config.calibration, rig.cameras.front().camera),
+      consistent_run_(kTrustedRun) {
   pose_index_.assign(static_cast<std::size_t>(config.capacity.keyframes), -1);
 }
 
@@ -166,7 +170,8 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   fuse_neighbourhood(newest_);
   map_.update_covisibility(newest_);
   optimise(newest_, config_.mapping.iterations);
-  if (config_.calibration.refine) refine_calibration();
+  // What bends the map would bend the calibration too.
+  if (config_.calibration.refine && consistent()) refine_calibration();
   cull_keyframes(newest_);
   limit_memory(newest_);
   map_.update_covisibility(newest_);
@@ -407,10 +412,12 @@ void Mapper::update_settling(double scale_change) {
     // not what they claim, however many inliers they have.
     settled_ = false;
     steady_optimisations_ = 0;
+    consistent_run_ = 0;
     return;
   }
+  consistent_run_ = std::min(consistent_run_ + 1, kTrustedRun);
   steady_optimisations_ = steady ? steady_optimisations_ + 1 : 0;
-  if (steady_optimisations_ >= kSteadyOptimisations) settled_ = true;
+  if (steady_optimisations_ >= kSteadyOptimisations && consistent_run_ == kTrustedRun) settled_ = true;
 }
 
 bool Mapper::consistent() const {

@@ -76,6 +76,7 @@ class Mapper {
   // Settling: how much the last optimisations still changed the young map's unit.
   int steady_optimisations_ = 0;
   bool settled_ = false;
+  int consistent_run_;                    // sound optimisations since the last that was not
 
   // Work space of local BA.
   BundleProblem problem_;

@@ -1,0 +1,91 @@
+// Whole recordings through the programs: import, lockstep replay, evaluation. The bounds are the peer's
+// figures on the same recordings (ORB-SLAM3, monocular, final trajectory, sim3), not what this version
+// happens to reach.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kData = fs::path(FARPOINT_SOURCE_DIR) / ".." / "shared" / "data";
+const fs::path kBin = fs::path(FARPOINT_BINARY_DIR) / "bin";
+
+// Status of a shell command; what it prints goes to this test's output.
+int run(const std::string& command) {
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+struct Recording {
+  std::string name;    // also the run's name in conditions
+  std::string folder;  // below the data folder
+  std::string import;  // arguments of farpoint import, {} stands for the data folder
+  std::vector<std::string> expect;
+  std::string evaluate;          // further arguments of farpoint evaluate
+  bool may_say_nothing = false;  // no valid pose at all is as right an answer
+};
+
+std::string with_data(std::string text) {
+  const std::size_t at = text.find("{}");
+  return at == std::string::npos ? text : text.replace(at, 2, kData.string());
+}
+
+class RecordedAccuracy : public testing::TestWithParam<Recording> {};
+
+TEST_P(RecordedAccuracy, HoldsThePeersFigures) {
+  const Recording& r = GetParam();
+  if (!fs::exists(kData / r.folder)) GTEST_SKIP() << "no recording " << (kData / r.folder);
+  const fs::path work = fs::path(testing::TempDir()) / ("farpoint_recorded_" + r.name);
+  fs::remove_all(work);
+  fs::create_directories(work);
+  const std::string log = (work / "recording.lcm").string(), out = (work / (r.name + ".lcm")).string();
+  ASSERT_EQ(run((kBin / "farpoint").string() + " import " + with_data(r.import) + " -o " + log), 0);
+  ASSERT_EQ(run((kBin / "farpointd").string() + " --replay " + log + " --lockstep --output " + out), 0);
+  const std::string evaluate =
+      (kBin / "farpoint").string() + " evaluate " + out + " --truth " + log + " " + r.evaluate;
+  std::string command = evaluate;
+  for (const std::string& e : r.expect) command += " --expect '" + r.name + "." + e + "'";
+  const bool silent = r.may_say_nothing && run(evaluate + " --expect '" + r.name + ".live.n <= 3'") == 0;
+  EXPECT_TRUE(silent || run(command) == 0) << command;
+  fs::remove_all(work);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Recordings, RecordedAccuracy,
+    testing::Values(Recording{"kitti03",
+                              "kitti",
+                              "kitti {}/kitti 03",
+                              {"final.ate_rmse_m <= 0.85", "final.share >= 0.98", "live.share >= 0.9",
+                               "live_ate <= 1.275", "resets == 1"},
+                              "--segments 0:70,110:400",
+                              false},
+                    Recording{"karlsruhe",
+                              "karlsruhe",
+                              "kitti {}/karlsruhe 2010_03_09_0019",
+                              {"final.ate_rmse_m <= 0.93", "final.share >= 0.98", "live.share >= 0.9",
+                               "live_ate <= 1.395", "resets == 1"},
+                              "",
+                              false},
+                    Recording{"euroc",
+                              "euroc",
+                              "euroc {}/euroc/MH_01_part",
+                              {"final.ate_rmse_m <= 0.006", "final.share >= 0.98", "live.share >= 0.9",
+                               "live_ate <= 0.009", "resets == 1"},
+                              "",
+                              false},
+                    // Almost pure rotation through a rolling shutter: whatever is called valid must be right.
+                    Recording{"tum_rpy",
+                              "tum",
+                              "tum {}/tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR
+                              "/config/cameras/tum-freiburg1.yaml",
+                              {"live.max_1s_rotation_deg <= 2"},
+                              "",
+                              true}),
+    [](const testing::TestParamInfo<Recording>& info) { return info.param.name; });
+
+}  // namespace
