@@ -1,5 +1,5 @@
-// Every parameter of the estimator: plain values, with units. The daemon fills them from farpoint.yaml; the defaults
-// here equal the shipped file. Nothing here may be fitted to one camera or recording.
+// Every parameter of the estimator: plain values, with units. The daemon fills them from farpoint.yaml; the
+// defaults here equal the shipped file. Nothing here may be fitted to one camera or recording.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace farpoint::slam {
 
-// How landmarks are promoted and used (METHOD.md). The landmark type and the tracker are the same in every mode.
+// How landmarks are promoted and used (METHOD.md). The landmark type and the tracker are the same in every
+// mode.
 enum class LandmarkMode { kBaseline, kVmp };
 
 // One camera on the body. T_body_camera maps camera coordinates into the body's.
@@ -23,67 +24,68 @@ struct RigCamera {
   SE3 T_body_camera;
 };
 
-// What frames come from. While the scale of the map is unknown, the lever arm between body and camera (metres) cannot
-// be expressed in map units: the body then stands at camera 0 with the body's axes.
+// What frames come from. While the scale of the map is unknown, the lever arm between body and camera
+// (metres) cannot be expressed in map units: the body then stands at camera 0 with the body's axes.
 struct Rig {
   std::vector<RigCamera> cameras;
 };
 
 struct CapacityConfig {
-  int keyframes = 1000;               // of all maps together
-  int landmarks = 40000;              // bearing, weak and full together
-  int observations_per_landmark = 48; // beyond it the oldest in between are thinned out
-  int window_images = 24;             // keyframes that keep their pyramid for alignment
+  int keyframes = 1000;                // of all maps together
+  int landmarks = 40000;               // bearing, weak and full together
+  int observations_per_landmark = 48;  // beyond it the oldest in between are thinned out
+  int window_images = 24;              // keyframes that keep their pyramid for alignment
 };
 
 struct InitialisationConfig {
-  double min_parallax_rad = 0.0175;     // a quarter of the points must show it: one degree
-  int min_landmarks = 80;               // good points two views must give
-  double max_frames = 30;               // reference is renewed after so many frames
+  double min_parallax_rad = 0.0175;  // a quarter of the points must show it: one degree
+  int min_landmarks = 80;            // good points two views must give
+  double max_frames = 30;            // reference is renewed after so many frames
 };
 
 struct TrackingConfig {
-  double prior_search_px = 15;          // window around the motion prior, level-0 pixels (times level scale)
-  double local_search_px = 4;           // window once a first pose is known
-  int min_matches = 20;                 // first pose from the prior
-  int min_inliers = 30;                 // fewer: lost
-  int degraded_inliers = 50;            // fewer: degraded
-  int max_hamming = 64;                 // of 256 bits
-  double pixel_sigma_px = 0.5;          // floor of an aligned measurement's error, level-0
+  double prior_search_px = 15;  // window around the motion prior, level-0 pixels (times level scale)
+  double local_search_px = 4;   // window once a first pose is known
+  int min_matches = 20;         // first pose from the prior
+  int min_inliers = 30;         // fewer: lost
+  int degraded_inliers = 50;    // fewer: degraded
+  int max_hamming = 64;         // of 256 bits
+  double pixel_sigma_px = 0.5;  // floor of an aligned measurement's error, level-0
 };
 
 struct KeyframeConfig {
-  double tracked_ratio = 0.85;          // of the reference keyframe's landmarks: fewer, new keyframe
-  int max_interval_frames = 10;         // with motion
-  double min_parallax_px = 15;          // median motion since the last keyframe that asks for a new one
+  double tracked_ratio = 0.85;   // of the reference keyframe's landmarks: fewer, new keyframe
+  int max_interval_frames = 10;  // with motion
+  double min_parallax_px = 15;   // median motion since the last keyframe that asks for a new one
 };
 
 struct LandmarkConfig {
   LandmarkMode mode = LandmarkMode::kVmp;
   double promote_parallax_rad = 0.020;  // largest parallax must be above it: acos(0.9998), as in the paper
-  double promote_relative_sigma = 0.3;   // sigma(inverse depth) / inverse depth must be below it
+  double promote_relative_sigma = 0.3;  // sigma(inverse depth) / inverse depth must be below it
   int max_bearing = 4000;               // candidates alive at once
 };
 
 struct MappingConfig {
-  int neighbours = 20;                  // keyframes searched for new landmarks
-  int window_keyframes = 20;            // optimised by local BA
-  int window_landmarks = 6000;          // at most so many in one local BA
-  int fixed_keyframes = 40;             // historical observers held fixed
-  int iterations = 8;                   // LM steps, never a time limit
-  int quick_view_delay_frames = 1;      // lockstep: triangulation is visible so many frames after the keyframe
-  int full_view_delay_frames = 2;       // lockstep: local BA is visible so many frames after the keyframe
-  std::string solver = "schur";         // schur | ceres
+  int neighbours = 20;              // keyframes searched for new landmarks
+  int window_keyframes = 20;        // optimised by local BA
+  int window_landmarks = 6000;      // at most so many in one local BA
+  int fixed_keyframes = 40;         // historical observers held fixed
+  int iterations = 8;               // LM steps, never a time limit
+  int quick_view_delay_frames = 1;  // lockstep: triangulation is visible so many frames after the keyframe
+  int full_view_delay_frames = 2;   // lockstep: local BA is visible so many frames after the keyframe
+  std::string solver = "schur";     // schur | ceres
 };
 
-// Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be trusted.
+// Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be
+// trusted.
 struct CalibrationConfig {
   bool refine = true;
-  double focal_sigma = 0.003;           // relative
+  double focal_sigma = 0.003;  // relative
   double centre_sigma_px = 2.0;
-  double distortion_sigma = 0.02;       // of the first radial coefficient
-  double information_share = 0.25;      // residuals are not independent: so much of their information counts
-  int min_keyframes = 8;                // free poses a window must have
+  double distortion_sigma = 0.02;   // of the first radial coefficient
+  double information_share = 0.25;  // residuals are not independent: so much of their information counts
+  int min_keyframes = 8;            // free poses a window must have
 };
 
 struct EstimatorConfig {

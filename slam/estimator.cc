@@ -17,14 +17,22 @@ namespace farpoint::slam {
 
 const char* to_string(State state) {
   switch (state) {
-    case State::kStarting: return "starting";
-    case State::kInitialising: return "initialising";
-    case State::kSettling: return "settling";
-    case State::kTracking: return "tracking";
-    case State::kDegraded: return "degraded";
-    case State::kLost: return "lost";
-    case State::kRelocalising: return "relocalising";
-    case State::kNoCamera: return "no_camera";
+    case State::kStarting:
+      return "starting";
+    case State::kInitialising:
+      return "initialising";
+    case State::kSettling:
+      return "settling";
+    case State::kTracking:
+      return "tracking";
+    case State::kDegraded:
+      return "degraded";
+    case State::kLost:
+      return "lost";
+    case State::kRelocalising:
+      return "relocalising";
+    case State::kNoCamera:
+      return "no_camera";
   }
   return "unknown";
 }
@@ -38,8 +46,8 @@ struct PyramidFrame final : FrameImage {
   [[nodiscard]] bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const override {
     return image.extract_patch(set, index, patch);
   }
-  [[nodiscard]] Alignment align(const Patch& host, const Eigen::Matrix2f& A, const Eigen::Vector2f& predicted_px,
-                                float max_shift_px) const override {
+  [[nodiscard]] Alignment align(const Patch& host, const Eigen::Matrix2f& A,
+                                const Eigen::Vector2f& predicted_px, float max_shift_px) const override {
     return image.align(host, A, predicted_px, max_shift_px);
   }
   Pyramid pyramid;
@@ -56,7 +64,9 @@ class PyramidPool {
     all_.push_back(std::make_shared<PyramidFrame>(width_px_, height_px_, options_));
     return all_.back();
   }
-  [[nodiscard]] std::size_t bytes() const { return all_.empty() ? 0 : all_.size() * all_.front()->pyramid.bytes(); }
+  [[nodiscard]] std::size_t bytes() const {
+    return all_.empty() ? 0 : all_.size() * all_.front()->pyramid.bytes();
+  }
 
  private:
   int width_px_, height_px_;
@@ -64,7 +74,8 @@ class PyramidPool {
   std::vector<std::shared_ptr<PyramidFrame>> all_;
 };
 
-// Where a frame was, relative to a keyframe, so that it follows the keyframe through every later optimisation.
+// Where a frame was, relative to a keyframe, so that it follows the keyframe through every later
+// optimisation.
 struct RecordedFrame {
   std::int64_t utime = 0;
   std::int32_t map_id = 0;
@@ -77,7 +88,8 @@ struct PendingView {
   std::shared_ptr<const LocalView> view;
 };
 
-// A pose that a third of the matched landmarks contradict is published, but not as valid. Rigid scenes show 0.7 and more.
+// A pose that a third of the matched landmarks contradict is published, but not as valid. Rigid scenes show
+// 0.7 and more.
 constexpr double kMinAgreement = 0.65;
 // Frames of trying to find the way back before a new map is begun.
 constexpr int kRelocalisationFrames = 15;
@@ -85,7 +97,8 @@ constexpr int kRelocalisationFrames = 15;
 constexpr int kYoungMapKeyframes = 5;
 
 Rig usable_rig(const Rig& rig) {
-  if (rig.cameras.empty()) throw std::invalid_argument("rig: no camera; at least one calibrated camera is needed");
+  if (rig.cameras.empty())
+    throw std::invalid_argument("rig: no camera; at least one calibrated camera is needed");
   Rig out = rig;
   for (const RigCamera& c : out.cameras)
     if (const std::string why = Camera::check(c.camera.parameters()); !why.empty())
@@ -127,11 +140,12 @@ struct Estimator::Impl {
 
   std::int32_t map_id = 0;
   std::deque<PendingView> pending;
-  std::uint64_t mapping_busy_until = 0;    // frame number at which mapping has nothing left to do
+  std::uint64_t mapping_busy_until = 0;  // frame number at which mapping has nothing left to do
   int frames_since_keyframe = 0;
   int lost_frames = 0;
   bool settled = false;
-  std::vector<std::shared_ptr<Frame>> waiting;    // frames before initialisation, posed once the map has settled
+  std::vector<std::shared_ptr<Frame>>
+      waiting;  // frames before initialisation, posed once the map has settled
   std::vector<RecordedFrame> recorded;
 
   // odom: integrates relative motion in the present unit.
@@ -164,7 +178,8 @@ struct Estimator::Impl {
 
   void index_features(Frame* frame) {
     constexpr int kGridCell_px = 24;
-    frame->grid = FeatureGrid(camera.width_px(), camera.height_px(), kGridCell_px, frame->set.features.size());
+    frame->grid =
+        FeatureGrid(camera.width_px(), camera.height_px(), kGridCell_px, frame->set.features.size());
     frame->grid.build(frame->set.features);
   }
 
@@ -194,13 +209,15 @@ struct Estimator::Impl {
         tracker.set_view(pending.front().view);
         settled = tracker.view()->settled;
         // The pose moved with its keyframe: the jump belongs to map_from_odom, not to odom.
-        if (has_last && !first) T_map_body_last = tracker.T_world_body() * (before.inverse() * T_map_body_last);
+        if (has_last && !first)
+          T_map_body_last = tracker.T_world_body() * (before.inverse() * T_map_body_last);
       }
       pending.pop_front();
     }
   }
 
-  // --- initialising --------------------------------------------------------------------------------------------
+  // --- initialising
+  // --------------------------------------------------------------------------------------------
   void initialise(const std::shared_ptr<Frame>& frame) {
     const std::optional<InitialPair> pair = initialiser.add(frame);
     result.matches = initialiser.last_matches();
@@ -226,7 +243,8 @@ struct Estimator::Impl {
     fill_pose(*frame, view->T_world_reference, Matrix6d::Zero());
   }
 
-  // --- tracking ------------------------------------------------------------------------------------------------
+  // --- tracking
+  // ------------------------------------------------------------------------------------------------
   void follow(const std::shared_ptr<Frame>& frame) {
     const bool was_lost = state == State::kLost || state == State::kRelocalising;
     TrackOutcome outcome = was_lost ? tracker.relocalise(*frame) : tracker.track(*frame);
@@ -288,8 +306,10 @@ struct Estimator::Impl {
     const std::uint64_t start = std::max(frame->number, mapping_busy_until);
     auto quick = mapper.insert(request);
     if (!quick) return;
-    pending.push_back({start + static_cast<std::uint64_t>(config.mapping.quick_view_delay_frames), std::move(quick)});
-    pending.push_back({start + static_cast<std::uint64_t>(config.mapping.full_view_delay_frames), mapper.refine()});
+    pending.push_back(
+        {start + static_cast<std::uint64_t>(config.mapping.quick_view_delay_frames), std::move(quick)});
+    pending.push_back(
+        {start + static_cast<std::uint64_t>(config.mapping.full_view_delay_frames), mapper.refine()});
     mapping_busy_until = pending.back().due_frame;
     frames_since_keyframe = 0;
     result.keyframe = true;
@@ -297,7 +317,8 @@ struct Estimator::Impl {
 
   // Frames from before the map: backwards and forwards from the pair that began it.
   void pose_waiting() {
-    std::stable_sort(waiting.begin(), waiting.end(), [](const auto& a, const auto& b) { return a->number > b->number; });
+    std::stable_sort(waiting.begin(), waiting.end(),
+                     [](const auto& a, const auto& b) { return a->number > b->number; });
     SE3 prior;
     const RecordedFrame* first = nullptr;
     for (const RecordedFrame& r : recorded)
@@ -358,7 +379,8 @@ struct Estimator::Impl {
   }
 };
 
-Estimator::Estimator(const EstimatorConfig& config, const Rig& rig) : impl_(std::make_unique<Impl>(config, rig)) {}
+Estimator::Estimator(const EstimatorConfig& config, const Rig& rig)
+    : impl_(std::make_unique<Impl>(config, rig)) {}
 Estimator::~Estimator() = default;
 
 const FrameResult& Estimator::process(const FrameInput& input) {
@@ -397,14 +419,17 @@ void Estimator::finish() {
     impl_->pose_waiting();
 }
 
-const EstimatorCounts& Estimator::counts() const { return impl_->counts; }
+const EstimatorCounts& Estimator::counts() const {
+  return impl_->counts;
+}
 
 std::vector<MapTrajectory> Estimator::trajectories() const {
   std::vector<MapTrajectory> out;
   for (const RecordedFrame& r : impl_->recorded) {
     SE3 T_world_reference;
     if (!impl_->mapper.map().pose_of(r.reference_id, &T_world_reference)) continue;
-    auto it = std::find_if(out.begin(), out.end(), [&](const MapTrajectory& t) { return t.map_id == r.map_id; });
+    auto it =
+        std::find_if(out.begin(), out.end(), [&](const MapTrajectory& t) { return t.map_id == r.map_id; });
     if (it == out.end()) it = out.insert(out.end(), MapTrajectory{r.map_id, {}});
     it->frames.push_back({r.utime, T_world_reference * r.T_reference_body});
   }
@@ -451,7 +476,8 @@ void Estimator::visit_observation_distances(const std::function<void(std::int32_
 
 std::vector<SE3> Estimator::keyframe_poses() const {
   std::vector<SE3> out;
-  impl_->mapper.map().keyframes().for_each([&](KeyframeHandle, const Keyframe& k) { out.push_back(k.T_world_body); });
+  impl_->mapper.map().keyframes().for_each(
+      [&](KeyframeHandle, const Keyframe& k) { out.push_back(k.T_world_body); });
   return out;
 }
 

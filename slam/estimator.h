@@ -1,7 +1,7 @@
 // The facade of the estimator: frames in, poses out. No I/O, no threads, no clock, no logging, no globals.
 //
-// Lockstep: one call of process() tracks one frame, runs the mapping jobs in a fixed order and takes their results a
-// configured number of frames later, as a real-time run would.
+// Lockstep: one call of process() tracks one frame, runs the mapping jobs in a fixed order and takes their
+// results a configured number of frames later, as a real-time run would.
 #pragma once
 
 #include <cstdint>
@@ -26,20 +26,22 @@ enum class State : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(State state);
 // Only these poses count as valid.
-[[nodiscard]] inline bool is_valid(State state) { return state == State::kTracking || state == State::kDegraded; }
+[[nodiscard]] inline bool is_valid(State state) {
+  return state == State::kTracking || state == State::kDegraded;
+}
 
 enum class ScaleState : std::uint8_t { kUnknown = 0, kAssumed = 1, kMetric = 2 };
 
 // One image of one camera.
 struct FrameInput {
-  std::int64_t utime = 0;       // mid-exposure, microseconds
+  std::int64_t utime = 0;  // mid-exposure, microseconds
   std::int64_t sequence = 0;
   int camera = 0;
   ImageView image;
 };
 
-// Features measured elsewhere: the feature-level simulator's way in. `image` must outlive the estimator's use of the
-// frame, hence shared.
+// Features measured elsewhere: the feature-level simulator's way in. `image` must outlive the estimator's use
+// of the frame, hence shared.
 struct FeatureInput {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
@@ -53,17 +55,17 @@ struct FrameResult {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
   State state = State::kStarting;
-  bool has_pose = false;               // T_map_body is an estimate (not necessarily valid, see state)
+  bool has_pose = false;  // T_map_body is an estimate (not necessarily valid, see state)
   SE3 T_map_body;
-  SE3 T_odom_body;                     // continuous: integrates relative motion, never jumps
+  SE3 T_odom_body;  // continuous: integrates relative motion, never jumps
   Sim3 map_from_odom;
-  Vector6d velocity_body = Vector6d::Zero();       // m/s (map units/s), rad/s in body axes
-  Matrix6d covariance = Matrix6d::Zero();          // of T_map_body, order (translation, rotation), body axes
-  int quality = -1;                    // -1 unknown, 0..100
+  Vector6d velocity_body = Vector6d::Zero();  // m/s (map units/s), rad/s in body axes
+  Matrix6d covariance = Matrix6d::Zero();     // of T_map_body, order (translation, rotation), body axes
+  int quality = -1;                           // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;
   ScaleState scale = ScaleState::kUnknown;
   std::int32_t map_id = 0;
-  std::uint64_t view_sequence = 0;     // local-map view this frame was tracked against
+  std::uint64_t view_sequence = 0;  // local-map view this frame was tracked against
   int features = 0, matches = 0, inliers = 0, aligned = 0;
   bool keyframe = false;
 };
@@ -72,9 +74,10 @@ struct FrameResult {
 struct EstimatorCounts {
   std::uint64_t frames = 0, frames_rejected = 0, keyframes_made = 0, keyframes_culled = 0, maps = 0, lost = 0;
   std::uint64_t landmarks_made = 0, landmarks_culled = 0, landmarks_fused = 0;
-  std::uint64_t vmp_made = 0, vmp_attached = 0, vmp_merged = 0, vmp_promoted = 0, vmp_rejected = 0, vmp_evicted = 0;
+  std::uint64_t vmp_made = 0, vmp_attached = 0, vmp_merged = 0, vmp_promoted = 0, vmp_rejected = 0,
+                vmp_evicted = 0;
   std::uint64_t local_ba = 0;
-  std::uint32_t keyframes = 0, landmarks = 0, vmps = 0;     // alive now
+  std::uint32_t keyframes = 0, landmarks = 0, vmps = 0;  // alive now
 };
 
 struct PosedFrame {
@@ -92,26 +95,26 @@ struct MapTrajectory {
 struct LandmarkInfo {
   std::uint64_t id = 0;
   std::int32_t map_id = 0;
-  Eigen::Vector3d position_map = Eigen::Vector3d::Zero();   // map units
-  double inverse_depth = 0, inverse_depth_sigma = 0;        // 1/map units, at the host
-  double creation_depth = 0;          // distance from the newest observing keyframe when it was made, map units
-  double creation_relative_sigma = 0; // sigma(depth)/depth then
+  Eigen::Vector3d position_map = Eigen::Vector3d::Zero();  // map units
+  double inverse_depth = 0, inverse_depth_sigma = 0;       // 1/map units, at the host
+  double creation_depth = 0;  // distance from the newest observing keyframe when it was made, map units
+  double creation_relative_sigma = 0;  // sigma(depth)/depth then
   bool through_vmp = false;
-  bool full = false;                  // else bearing or weak
+  bool full = false;  // else bearing or weak
   int observations = 0;
-  std::uint64_t tag = 0;              // simulator: which true point the host patch shows; 0 elsewhere
+  std::uint64_t tag = 0;  // simulator: which true point the host patch shows; 0 elsewhere
 };
 
 // Camera 0's calibration as refined from the map, relative to the given one; zero where refinement is off.
 struct CalibrationInfo {
-  double focal_scale = 0, cx_px = 0, cy_px = 0, k1 = 0;                           // focal_scale: log of the factor
-  double focal_scale_sigma = 0, cx_sigma_px = 0, cy_sigma_px = 0, k1_sigma = 0;   // 1 sigma
+  double focal_scale = 0, cx_px = 0, cy_px = 0, k1 = 0;  // focal_scale: log of the factor
+  double focal_scale_sigma = 0, cx_sigma_px = 0, cy_sigma_px = 0, k1_sigma = 0;  // 1 sigma
 };
 
 class Estimator {
  public:
-  // Allocates everything. Throws std::invalid_argument with a sentence a user can act on where the configuration or
-  // the rig cannot work.
+  // Allocates everything. Throws std::invalid_argument with a sentence a user can act on where the
+  // configuration or the rig cannot work.
   Estimator(const EstimatorConfig& config, const Rig& rig);
   ~Estimator();
   Estimator(const Estimator&) = delete;
@@ -129,9 +132,10 @@ class Estimator {
   // All maps, most frames first.
   [[nodiscard]] std::vector<MapTrajectory> trajectories() const;
   [[nodiscard]] std::vector<LandmarkInfo> landmarks() const;
-  // Calls visit(distance, relative_sigma) for every observation of the final maps' full landmarks: camera-to-point
-  // distance in map units.
-  void visit_observation_distances(const std::function<void(std::int32_t map_id, double distance)>& visit) const;
+  // Calls visit(distance, relative_sigma) for every observation of the final maps' full landmarks:
+  // camera-to-point distance in map units.
+  void visit_observation_distances(
+      const std::function<void(std::int32_t map_id, double distance)>& visit) const;
   [[nodiscard]] std::vector<SE3> keyframe_poses() const;
   [[nodiscard]] CalibrationInfo calibration() const;
   // Bytes of every pool, for the table printed at start.

@@ -1,6 +1,7 @@
 // Camera models: pinhole + radial-tangential (k1 k2 p1 p2 k3) and Kannala-Brandt (k1..k4, "equidistant").
 //
-// Camera axes: x right, y down, z forward. Pixels: (0,0) is the centre of the upper left pixel, u right, v down.
+// Camera axes: x right, y down, z forward. Pixels: (0,0) is the centre of the upper left pixel, u right, v
+// down.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,8 +31,9 @@ class Camera {
   // never fold far-off-axis points back into the image. Precondition: check(p) is empty.
   explicit Camera(const Parameters& p);
 
-  // Empty where the parameters make a usable camera, else a sentence saying what is wrong and what was expected
-  // (size > 0, focal lengths > 0 and finite, principal point within the image, finite distortion, ...).
+  // Empty where the parameters make a usable camera, else a sentence saying what is wrong and what was
+  // expected (size > 0, focal lengths > 0 and finite, principal point within the image, finite distortion,
+  // ...).
   [[nodiscard]] static std::string check(const Parameters& p);
 
   [[nodiscard]] const Parameters& parameters() const { return p_; }
@@ -40,13 +42,14 @@ class Camera {
   // Mean focal length, for turning pixels into radians.
   [[nodiscard]] double focal_px() const { return 0.5 * (p_.fx_px + p_.fy_px); }
 
-  // Point in camera axes (any positive length) -> pixel. False where the point is behind the camera or beyond the
-  // monotonic range; the pixel may lie outside the image.
+  // Point in camera axes (any positive length) -> pixel. False where the point is behind the camera or beyond
+  // the monotonic range; the pixel may lie outside the image.
   [[nodiscard]] bool project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel) const;
   // The same with the 2x3 derivative d(pixel)/d(point_c).
-  [[nodiscard]] bool project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel, Matrix23d* d_pixel_d_point) const;
-  // Pixel -> unit bearing in camera axes. False where the pixel has no ray (beyond the model's range). Accurate to
-  // 1e-9 rad inside the image.
+  [[nodiscard]] bool project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel,
+                             Matrix23d* d_pixel_d_point) const;
+  // Pixel -> unit bearing in camera axes. False where the pixel has no ray (beyond the model's range).
+  // Accurate to 1e-9 rad inside the image.
   [[nodiscard]] bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c) const;
 
   // True where the pixel lies in the image at least border_px away from its edge.
@@ -57,8 +60,8 @@ class Camera {
 
  private:
   Parameters p_;
-  double max_theta_rad_ = 0.0;    // beyond this angle from the optical axis nothing projects
-  double max_radius_ = 0.0;       // radtan: tan(max_theta_rad_); Kannala-Brandt: theta_d(max_theta_rad_)
+  double max_theta_rad_ = 0.0;  // beyond this angle from the optical axis nothing projects
+  double max_radius_ = 0.0;     // radtan: tan(max_theta_rad_); Kannala-Brandt: theta_d(max_theta_rad_)
 };
 
 }  // namespace farpoint::slam

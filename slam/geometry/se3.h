@@ -36,7 +36,9 @@ struct SE3 {
     const Eigen::Quaterniond qi = q.conjugate();
     return {qi, -(qi * t)};
   }
-  [[nodiscard]] SE3 operator*(const SE3& other) const { return {(q * other.q).normalized(), q * other.t + t}; }
+  [[nodiscard]] SE3 operator*(const SE3& other) const {
+    return {(q * other.q).normalized(), q * other.t + t};
+  }
   [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return q * p + t; }
   // This pose moved by delta = (dt, dphi) as defined at the top of this file.
   [[nodiscard]] SE3 boxplus(const Vector6d& delta) const {

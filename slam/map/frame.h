@@ -12,7 +12,7 @@
 namespace farpoint::slam {
 
 struct Frame {
-  std::uint64_t number = 0;       // counts processed frames, from 0
+  std::uint64_t number = 0;  // counts processed frames, from 0
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
   int camera = 0;
@@ -35,8 +35,8 @@ struct SightingCount {
   std::uint16_t visible = 0, found = 0;
 };
 
-// A frame that tracking wants remembered. The pose is relative to a keyframe, so that it stays right when mapping
-// moves that keyframe in the meantime.
+// A frame that tracking wants remembered. The pose is relative to a keyframe, so that it stays right when
+// mapping moves that keyframe in the meantime.
 struct KeyframeRequest {
   std::shared_ptr<Frame> frame;
   std::int32_t map_id = 0;
@@ -48,13 +48,13 @@ struct KeyframeRequest {
 
 struct InitialPoint {
   std::size_t feature_first = 0, feature_second = 0;
-  double inverse_depth = 0;    // along the bearing in the first camera, 1 / baseline
+  double inverse_depth = 0;  // along the bearing in the first camera, 1 / baseline
 };
 
 // Two frames with known relative motion.
 struct InitialPair {
   std::shared_ptr<Frame> first, second;
-  SE3 T_first_second;      // bodies, unit baseline
+  SE3 T_first_second;  // bodies, unit baseline
   std::vector<InitialPoint> points;
 };
 

@@ -12,11 +12,11 @@ namespace farpoint::slam {
 
 struct Covisible {
   KeyframeHandle keyframe;
-  int shared = 0;    // landmarks seen by both
+  int shared = 0;  // landmarks seen by both
 };
 
 struct Keyframe {
-  std::uint64_t id = 0;             // ascending over the whole run
+  std::uint64_t id = 0;  // ascending over the whole run
   std::int32_t map_id = 0;
   std::int64_t utime = 0;
   std::uint64_t frame_number = 0;
@@ -24,14 +24,14 @@ struct Keyframe {
   SE3 T_world_body;
 
   FeatureSet set;
-  std::vector<Eigen::Vector3f> bearings;     // unit, camera axes; one a feature
-  std::vector<LandmarkHandle> landmarks;     // one a feature; null: none
+  std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
+  std::vector<LandmarkHandle> landmarks;  // one a feature; null: none
   FeatureGrid grid;
   // Pixels for alignment, while the keyframe is recent (CapacityConfig::window_images).
   std::shared_ptr<const FrameImage> image;
 
-  std::vector<Covisible> covisible;          // most shared first, then newest first
-  std::uint64_t optimised = 0;               // times local BA moved it
+  std::vector<Covisible> covisible;  // most shared first, then newest first
+  std::uint64_t optimised = 0;       // times local BA moved it
 };
 
 }  // namespace farpoint::slam

@@ -20,12 +20,13 @@ using LandmarkHandle = Handle<Landmark>;
 // full:    a map point.
 enum class LandmarkState : std::uint8_t { kBearing, kWeak, kFull };
 
-// What one keyframe saw of a landmark. The host's own sighting is one too (it defines the bearing; BA skips it).
+// What one keyframe saw of a landmark. The host's own sighting is one too (it defines the bearing; BA skips
+// it).
 struct Observation {
   KeyframeHandle keyframe;
-  std::int32_t feature = -1;                          // index in the keyframe's features
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();    // measured (aligned) level-0 pixel
-  float sigma_px = 1.0F;                              // its error, level-0 pixels
+  std::int32_t feature = -1;                        // index in the keyframe's features
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // measured (aligned) level-0 pixel
+  float sigma_px = 1.0F;                            // its error, level-0 pixels
 };
 
 struct Landmark {
@@ -33,30 +34,31 @@ struct Landmark {
   std::int32_t map_id = 0;
   LandmarkState state = LandmarkState::kBearing;
 
-  // Geometry. The anchor camera is rigidly attached to the host keyframe's body: at first it is the camera that saw
-  // it; when the host is forgotten the anchor stays where it was and is attached to the next host, so that nothing of
-  // bearing, depth or patch is lost. Point in host-body axes: (R_host_anchor f + rho t_host_anchor) / rho.
+  // Geometry. The anchor camera is rigidly attached to the host keyframe's body: at first it is the camera
+  // that saw it; when the host is forgotten the anchor stays where it was and is attached to the next host,
+  // so that nothing of bearing, depth or patch is lost. Point in host-body axes: (R_host_anchor f + rho
+  // t_host_anchor) / rho.
   KeyframeHandle host;
   SE3 T_host_anchor;
-  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();                     // f, unit, anchor axes
-  Eigen::Matrix<double, 3, 2> d_bearing_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();    // at the host pixel
-  Eigen::Vector2d host_pixel = Eigen::Vector2d::Zero();   // level-0 pixel of the anchor camera
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // f, unit, anchor axes
+  Eigen::Matrix<double, 3, 2> d_bearing_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();  // at the host pixel
+  Eigen::Vector2d host_pixel = Eigen::Vector2d::Zero();  // level-0 pixel of the anchor camera
   int host_camera = 0;
-  double inverse_depth = 0;         // rho >= 0, 1 / distance along f, 1 / map units
+  double inverse_depth = 0;  // rho >= 0, 1 / distance along f, 1 / map units
   double inverse_depth_sigma = 0;
-  double max_parallax_rad = 0;      // largest angle between the host's ray and another observer's
-  KeyframeHandle parallax_keyframe; // the observer that gives it, with the host the best pair
+  double max_parallax_rad = 0;       // largest angle between the host's ray and another observer's
+  KeyframeHandle parallax_keyframe;  // the observer that gives it, with the host the best pair
 
   Patch patch;
   Descriptor descriptor;
   std::uint8_t host_level = 0;
-  std::vector<Observation> observations;    // by ascending keyframe id
+  std::vector<Observation> observations;  // by ascending keyframe id
 
   // Statistics for culling and reports.
-  std::uint64_t created_keyframe = 0;   // id of the keyframe at which it was made (bearing) or promoted
+  std::uint64_t created_keyframe = 0;  // id of the keyframe at which it was made (bearing) or promoted
   std::uint64_t last_seen_keyframe = 0;
-  std::uint32_t visible = 1, found = 1; // frames in which it should have been, and was, seen
-  std::uint8_t failures = 0;            // failed promotions
+  std::uint32_t visible = 1, found = 1;  // frames in which it should have been, and was, seen
+  std::uint8_t failures = 0;             // failed promotions
   bool through_vmp = false;
   double creation_depth = 0;
   double creation_relative_sigma = 0;

@@ -1,5 +1,6 @@
-// What tracking sees of the map: an immutable copy of the landmarks around the vehicle, made by mapping and handed over
-// whole. Everything the tracker needs of a landmark is here, in world axes, so that it never touches the map.
+// What tracking sees of the map: an immutable copy of the landmarks around the vehicle, made by mapping and
+// handed over whole. Everything the tracker needs of a landmark is here, in world axes, so that it never
+// touches the map.
 #pragma once
 
 #include <memory>
@@ -12,15 +13,15 @@ namespace farpoint::slam {
 
 struct ViewLandmark {
   LandmarkHandle handle;
-  Eigen::Vector4d point_w = Eigen::Vector4d::Zero();                    // homogeneous: xyz / rho
-  Eigen::Vector3d anchor_w = Eigen::Vector3d::Zero();                   // centre of the anchor camera
-  Eigen::Matrix<double, 3, 2> d_point_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();    // of xyz, world axes
+  Eigen::Vector4d point_w = Eigen::Vector4d::Zero();   // homogeneous: xyz / rho
+  Eigen::Vector3d anchor_w = Eigen::Vector3d::Zero();  // centre of the anchor camera
+  Eigen::Matrix<double, 3, 2> d_point_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();  // of xyz, world axes
   double inverse_depth_sigma = 0;
   Descriptor descriptor;
   Patch patch;
   std::uint8_t host_level = 0;
-  bool in_reference = false;    // seen by the reference keyframe
-  bool confirmed = false;       // state full
+  bool in_reference = false;  // seen by the reference keyframe
+  bool confirmed = false;     // state full
 };
 
 struct ViewKeyframe {
@@ -31,15 +32,15 @@ struct ViewKeyframe {
 struct LocalView {
   std::uint64_t sequence = 0;
   std::int32_t map_id = 0;
-  Rig rig;                                  // with the calibration as refined so far
-  std::uint64_t reference_id = 0;           // newest keyframe
+  Rig rig;                         // with the calibration as refined so far
+  std::uint64_t reference_id = 0;  // newest keyframe
   SE3 T_world_reference;
-  std::vector<ViewKeyframe> keyframes;      // the window, for re-expressing older poses
+  std::vector<ViewKeyframe> keyframes;  // the window, for re-expressing older poses
   std::vector<ViewLandmark> landmarks;
-  int reference_landmarks = 0;              // full landmarks in the reference keyframe
-  int map_keyframes = 0;                    // alive in this map
-  double median_depth = 1.0;                // of the reference keyframe's landmarks, map units
-  bool settled = false;                     // the map's scale holds (mapping/settling)
+  int reference_landmarks = 0;  // full landmarks in the reference keyframe
+  int map_keyframes = 0;        // alive in this map
+  double median_depth = 1.0;    // of the reference keyframe's landmarks, map units
+  bool settled = false;         // the map's scale holds (mapping/settling)
 };
 
 }  // namespace farpoint::slam

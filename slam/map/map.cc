@@ -28,7 +28,8 @@ KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
 void Map::remove_keyframe(KeyframeHandle handle) {
   if (!keyframes_.contains(handle)) return;
   Keyframe& keyframe = keyframes_[handle];
-  // The keyframe that shares most keeps the pose of this one; the nearest id stands in where nothing is shared.
+  // The keyframe that shares most keeps the pose of this one; the nearest id stands in where nothing is
+  // shared.
   KeyframeHandle parent;
   for (const Covisible& c : keyframe.covisible)
     if (keyframes_.contains(c.keyframe)) {
@@ -67,7 +68,7 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   const LandmarkHandle handle = landmarks_.allocate();
   if (handle.is_null()) return handle;
   Landmark& l = landmarks_[handle];
-  std::vector<Observation> observations = std::move(l.observations);    // keeps its capacity
+  std::vector<Observation> observations = std::move(l.observations);  // keeps its capacity
   l = Landmark{};
   l.observations = std::move(observations);
   l.observations.clear();
@@ -102,7 +103,8 @@ bool Map::set_bearing(Landmark* l) const {
     // Central difference over one pixel: exact to second order, and the patch spans several pixels anyway.
     const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
     Eigen::Vector3d a, b;
-    if (!camera.unproject(l->host_pixel + half, &a) || !camera.unproject(l->host_pixel - half, &b)) return false;
+    if (!camera.unproject(l->host_pixel + half, &a) || !camera.unproject(l->host_pixel - half, &b))
+      return false;
     derivative.col(axis) = a - b;
   }
   l->bearing = bearing;
@@ -148,7 +150,8 @@ bool Map::add_observation(LandmarkHandle handle, const Observation& observation)
   Landmark& l = landmarks_[handle];
   Keyframe& k = keyframes_[observation.keyframe];
   const auto feature = static_cast<std::size_t>(observation.feature);
-  if (observation.feature < 0 || feature >= k.landmarks.size() || !k.landmarks[feature].is_null()) return false;
+  if (observation.feature < 0 || feature >= k.landmarks.size() || !k.landmarks[feature].is_null())
+    return false;
   if (find_observation(l, observation.keyframe) != nullptr) return false;
   k.landmarks[feature] = handle;
   const auto later = std::find_if(l.observations.begin(), l.observations.end(),
@@ -169,8 +172,8 @@ void Map::note_parallax(const Observation& o, Landmark* l) const {
 }
 
 void Map::thin_observations(Landmark& l, LandmarkHandle handle) {
-  // The host defines the bearing, the best pair the depth, the newest ones the link to tracking: of the rest the one
-  // in the middle tells least that its neighbours do not.
+  // The host defines the bearing, the best pair the depth, the newest ones the link to tracking: of the rest
+  // the one in the middle tells least that its neighbours do not.
   std::size_t middle = l.observations.size() / 2;
   while (middle + 1 < l.observations.size() && (l.observations[middle].keyframe == l.host ||
                                                 l.observations[middle].keyframe == l.parallax_keyframe))
@@ -223,7 +226,9 @@ void Map::fuse(LandmarkHandle into, LandmarkHandle from) {
   landmarks_[into].visible += visible;
 }
 
-SE3 Map::T_world_anchor(const Landmark& l) const { return keyframes_[l.host].T_world_body * l.T_host_anchor; }
+SE3 Map::T_world_anchor(const Landmark& l) const {
+  return keyframes_[l.host].T_world_body * l.T_host_anchor;
+}
 
 SE3 Map::T_world_camera(const Keyframe& k) const {
   return k.T_world_body * rig_.cameras[static_cast<std::size_t>(k.camera)].T_body_camera;
@@ -268,7 +273,8 @@ void Map::update_covisibility(KeyframeHandle handle) {
     if (h == handle || shared == 0) return;
     keyframe.covisible.push_back({h, shared});
     const Covisible back{handle, shared};
-    other.covisible.insert(std::lower_bound(other.covisible.begin(), other.covisible.end(), back, stronger), back);
+    other.covisible.insert(std::lower_bound(other.covisible.begin(), other.covisible.end(), back, stronger),
+                           back);
   });
   std::sort(keyframe.covisible.begin(), keyframe.covisible.end(), stronger);
 }

@@ -1,6 +1,7 @@
-// The map: pools of keyframes and landmarks and the links between them. Mapping is its only writer; tracking reads
-// LocalView copies. Keeps both sides of every link consistent:
-//     keyframe.landmarks[o.feature] == landmark   <=>   an observation o of the landmark names keyframe and feature.
+// The map: pools of keyframes and landmarks and the links between them. Mapping is its only writer; tracking
+// reads LocalView copies. Keeps both sides of every link consistent:
+//     keyframe.landmarks[o.feature] == landmark   <=>   an observation o of the landmark names keyframe and
+//     feature.
 #pragma once
 
 #include <cstdint>
@@ -16,27 +17,31 @@ class Map {
  public:
   Map(const CapacityConfig& capacity, const Rig& rig);
 
-  // --- keyframes -----------------------------------------------------------------------------------------------
-  // Null when full: the caller makes room first (remove_keyframe).
+  // --- keyframes
+  // ----------------------------------------------------------------------------------------------- Null when
+  // full: the caller makes room first (remove_keyframe).
   [[nodiscard]] KeyframeHandle add_keyframe(Keyframe&& keyframe);
-  // Re-hosts what it hosts, detaches its observations, remembers its pose in the skeleton relative to its most
-  // covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
+  // Re-hosts what it hosts, detaches its observations, remembers its pose in the skeleton relative to its
+  // most covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
   void remove_keyframe(KeyframeHandle handle);
 
-  // --- landmarks -----------------------------------------------------------------------------------------------
-  // A new landmark of state bearing hosted by (keyframe, feature), with that one observation. Null when full or when
-  // no patch can be cut around the feature.
+  // --- landmarks
+  // ----------------------------------------------------------------------------------------------- A new
+  // landmark of state bearing hosted by (keyframe, feature), with that one observation. Null when full or
+  // when no patch can be cut around the feature.
   [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, std::size_t feature);
   void remove_landmark(LandmarkHandle handle);
-  // False where the keyframe already sees the landmark, has no such feature, or the feature belongs to another one.
+  // False where the keyframe already sees the landmark, has no such feature, or the feature belongs to
+  // another one.
   bool add_observation(LandmarkHandle landmark, const Observation& observation);
-  // Removes the sighting by `keyframe`; re-hosts where it was the host's. The landmark goes when fewer than two are
-  // left. True while the landmark lives.
+  // Removes the sighting by `keyframe`; re-hosts where it was the host's. The landmark goes when fewer than
+  // two are left. True while the landmark lives.
   bool remove_observation(LandmarkHandle landmark, KeyframeHandle keyframe);
   // Moves the observations of `from` to `into` where they do not collide, then removes `from`.
   void fuse(LandmarkHandle into, LandmarkHandle from);
-  // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are. Does nothing where
-  // new_host does not see the landmark: a host must be an observer, or the landmark would not hear of its removal.
+  // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are. Does
+  // nothing where new_host does not see the landmark: a host must be an observer, or the landmark would not
+  // hear of its removal.
   void rehost(LandmarkHandle landmark, KeyframeHandle new_host);
 
   [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe);
@@ -47,17 +52,20 @@ class Map {
   // Angle between the host's ray and the observer's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 
-  // --- calibration ---------------------------------------------------------------------------------------------
-  // Uses a refined calibration from now on: the bearings of landmarks, and of keyframes that still have pixels, are
+  // --- calibration
+  // --------------------------------------------------------------------------------------------- Uses a
+  // refined calibration from now on: the bearings of landmarks, and of keyframes that still have pixels, are
   // made anew; poses and inverse depths stay.
   void set_camera(int index, const Camera& camera);
 
-  // --- covisibility --------------------------------------------------------------------------------------------
-  // Counts again which keyframes share landmarks with this one, both ways.
+  // --- covisibility
+  // -------------------------------------------------------------------------------------------- Counts again
+  // which keyframes share landmarks with this one, both ways.
   void update_covisibility(KeyframeHandle handle);
 
-  // --- the way home --------------------------------------------------------------------------------------------
-  // Pose of any keyframe ever made in a living map by its id, also of removed ones; false where it is unknown.
+  // --- the way home
+  // -------------------------------------------------------------------------------------------- Pose of any
+  // keyframe ever made in a living map by its id, also of removed ones; false where it is unknown.
   [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const;
 
   // Everything of one map goes (a map that never came to life).
@@ -88,10 +96,10 @@ class Map {
   Rig rig_;
   Pool<Keyframe> keyframes_;
   Pool<Landmark> landmarks_;
-  std::vector<SkeletonNode> skeleton_;    // by keyframe id - 1
+  std::vector<SkeletonNode> skeleton_;  // by keyframe id - 1
   std::uint64_t next_keyframe_id_ = 1;
   std::uint64_t next_landmark_id_ = 1;
-  std::vector<int> shared_count_;         // scratch of update_covisibility, one a keyframe slot
+  std::vector<int> shared_count_;  // scratch of update_covisibility, one a keyframe slot
 };
 
 }  // namespace farpoint::slam

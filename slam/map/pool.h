@@ -1,5 +1,5 @@
-// Fixed-capacity storage with generation handles. A handle to something that has gone never resolves to what took
-// its place, and nothing moves or allocates after construction.
+// Fixed-capacity storage with generation handles. A handle to something that has gone never resolves to what
+// took its place, and nothing moves or allocates after construction.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +18,8 @@ struct Handle {
   [[nodiscard]] bool operator==(const Handle&) const = default;
 };
 
-// Slots are handed out lowest index first among never-used ones, then the most recently returned: the same sequence of
-// calls gives the same handles.
+// Slots are handed out lowest index first among never-used ones, then the most recently returned: the same
+// sequence of calls gives the same handles.
 template <typename T>
 class Pool {
  public:
@@ -67,7 +67,8 @@ class Pool {
   [[nodiscard]] bool full() const { return size_ == slots_.size(); }
   [[nodiscard]] std::size_t bytes() const { return slots_.size() * (sizeof(Slot) + sizeof(std::uint32_t)); }
 
-  // Calls visit(handle, object) for everything alive, by ascending slot. The visitor may release the visited one.
+  // Calls visit(handle, object) for everything alive, by ascending slot. The visitor may release the visited
+  // one.
   template <typename Visitor>
   void for_each(Visitor&& visit) {
     for (std::uint32_t i = 0; i < used_; ++i)

@@ -20,7 +20,8 @@ bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camer
   const double distance_ratio = p_c.norm();
   out->scale_change = static_cast<float>(1.0 / std::max(distance_ratio, 1e-6));
   const Eigen::Vector3d anchor_ray = in.point_w.head<3>() - rho * in.anchor_w;
-  out->view_cosine = anchor_ray.dot(R.transpose() * p_c) / std::max(anchor_ray.norm() * distance_ratio, 1e-12);
+  out->view_cosine =
+      anchor_ray.dot(R.transpose() * p_c) / std::max(anchor_ray.norm() * distance_ratio, 1e-12);
   return true;
 }
 

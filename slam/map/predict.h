@@ -11,11 +11,11 @@ namespace farpoint::slam {
 // Sighting expected in one camera.
 struct Prediction {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  Matrix23d d_pixel_d_point = Matrix23d::Zero();                       // by the point in camera axes
-  Eigen::Matrix2f A_target_host = Eigen::Matrix2f::Identity();         // d(pixel) / d(host pixel)
+  Matrix23d d_pixel_d_point = Matrix23d::Zero();                // by the point in camera axes
+  Eigen::Matrix2f A_target_host = Eigen::Matrix2f::Identity();  // d(pixel) / d(host pixel)
   Eigen::Vector2d d_pixel_d_inverse_depth = Eigen::Vector2d::Zero();
-  float scale_change = 1.0F;     // size here / size in the host
-  double view_cosine = 1.0;      // between the anchor's ray and this camera's
+  float scale_change = 1.0F;  // size here / size in the host
+  double view_cosine = 1.0;   // between the anchor's ray and this camera's
 };
 
 // The inputs, in world axes, as ViewLandmark keeps them.
@@ -26,8 +26,8 @@ struct PredictionInput {
 };
 
 // False where the landmark does not project into the camera's image (border_px from the edge).
-[[nodiscard]] bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camera_world, double border_px,
-                           Prediction* out);
+[[nodiscard]] bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camera_world,
+                           double border_px, Prediction* out);
 
 // Pyramid level on which the landmark should be detected.
 [[nodiscard]] int predicted_level(int host_level, float scale_change, float scale_factor, int levels);
@@ -43,16 +43,16 @@ struct DescriptorQuery {
   float u_px = 0, v_px = 0, radius_px = 0;
   int min_level = 0, max_level = 0;
   int max_hamming = 64;
-  float ratio = 0.9F;       // best must be below ratio * second best (of another place), 1: no test
+  float ratio = 0.9F;  // best must be below ratio * second best (of another place), 1: no test
 };
-// Index of the best feature that `usable(index)` admits, or -1. Corners at the best one's place are no rivals of it: the
-// same corner is often found on the next level too.
+// Index of the best feature that `usable(index)` admits, or -1. Corners at the best one's place are no rivals
+// of it: the same corner is often found on the next level too.
 template <typename Usable>
 [[nodiscard]] int find_descriptor(const FeatureSet& set, const FeatureGrid& grid, const DescriptorQuery& q,
                                   Usable&& usable, int* distance = nullptr) {
   constexpr int kNone = 257;
   int best = -1, best_distance = kNone, second_distance = kNone;
-  bool uncertain = false;    // second_distance was taken around another best one
+  bool uncertain = false;  // second_distance was taken around another best one
   const auto visit = [&](auto&& consider) {
     grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
       if (usable(i)) consider(i, hamming_distance(q.descriptor, set.descriptors[i]));

@@ -53,12 +53,16 @@ Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
   return Camera(p);
 }
 
-Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given) : config_(config), given_(given) {
-  const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px, config.distortion_sigma);
+Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given)
+    : config_(config), given_(given) {
+  const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
+                      config.distortion_sigma);
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-CalibrationDelta Calibrator::sigma() const { return information_.inverse().diagonal().cwiseSqrt(); }
+CalibrationDelta Calibrator::sigma() const {
+  return information_.inverse().diagonal().cwiseSqrt();
+}
 
 Calibrator::Quadratic Calibrator::window_information(
     const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
@@ -82,11 +86,12 @@ Calibrator::Quadratic Calibrator::window_information(
     if (!derivative.at(point.bearing, &d_host_pixel)) continue;
     // The host's pixel is given; its bearing moves against what the projection would do.
     const Eigen::Matrix<double, 3, kParameters> d_xyz_d_delta =
-        -(frames.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing[k] * d_host_pixel;
+        -(frames.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing[k] *
+        d_host_pixel;
     double h = 0.0, gradient = 0.0;
     touched.clear();
-    const auto add_pose = [&](int b, const Eigen::Matrix<double, 2, 6>& J, const BundleLinearisation& lin, double weight,
-                              const Jacobian24& Jd) {
+    const auto add_pose = [&](int b, const Eigen::Matrix<double, 2, 6>& J, const BundleLinearisation& lin,
+                              double weight, const Jacobian24& Jd) {
       const Eigen::Index at = 6 * b;
       if (std::find(touched.begin(), touched.end(), at) == touched.end()) touched.push_back(at);
       H.block<6, 6>(at, at).noalias() += weight * J.transpose() * J;
@@ -108,7 +113,8 @@ Calibrator::Quadratic Calibrator::window_information(
       const double weight = 1.0;
       h += lin.d_inverse_depth.squaredNorm();
       gradient += lin.d_inverse_depth.dot(lin.residual);
-      const int bh = block[static_cast<std::size_t>(point.host)], bt = block[static_cast<std::size_t>(m.pose)];
+      const int bh = block[static_cast<std::size_t>(point.host)],
+                bt = block[static_cast<std::size_t>(m.pose)];
       if (bh >= 0) add_pose(bh, lin.d_host, lin, weight, Jd);
       if (bt >= 0) add_pose(bt, lin.d_target, lin, weight, Jd);
       if (bh >= 0 && bt >= 0) {
@@ -162,16 +168,19 @@ double Calibrator::image_change_px(const CalibrationDelta& change) const {
   const Camera before = camera(), after = refined_camera(given_, delta_ + change);
   const double w = given_.width_px() - 1, h = given_.height_px() - 1;
   double largest = 0.0;
-  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(0, 0), Eigen::Vector2d(w, 0), Eigen::Vector2d(0, h),
-                                       Eigen::Vector2d(w, h), Eigen::Vector2d(0, h / 2), Eigen::Vector2d(w, h / 2)}) {
+  for (const Eigen::Vector2d& pixel :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(w, 0), Eigen::Vector2d(0, h), Eigen::Vector2d(w, h),
+        Eigen::Vector2d(0, h / 2), Eigen::Vector2d(w, h / 2)}) {
     Eigen::Vector3d ray;
     Eigen::Vector2d moved;
-    if (before.unproject(pixel, &ray) && after.project(ray, &moved)) largest = std::max(largest, (moved - pixel).norm());
+    if (before.unproject(pixel, &ray) && after.project(ray, &moved))
+      largest = std::max(largest, (moved - pixel).norm());
   }
   return largest;
 }
 
-bool Calibrator::update(const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) {
+bool Calibrator::update(const BundleProblem& problem,
+                        const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) {
   int free = 0;
   for (const auto& pose : problem.poses) free += pose.fixed ? 0 : 1;
   if (free < config_.min_keyframes) return false;

@@ -1,13 +1,13 @@
 // Refines a camera's calibration from the map (ours; not in the paper).
 //
-// A rectified or factory calibration is good to about a pixel, and a small bias of it is the same in every frame: a slow
-// turn adds it up into a loss of scale. The same measurements that local BA uses also say what the calibration is; this
-// estimator gathers that, with the given calibration as prior.
+// A rectified or factory calibration is good to about a pixel, and a small bias of it is the same in every
+// frame: a slow turn adds it up into a loss of scale. The same measurements that local BA uses also say what
+// the calibration is; this estimator gathers that, with the given calibration as prior.
 //
-// State: delta = (log focal scale, cx, cy, k1), relative to the given calibration; k1 is the first radial coefficient
-// of either camera model. Every local BA leaves a quadratic in delta after poses and inverse depths are eliminated.
-// Windows overlap, so a measurement would be counted once a window: of each quadratic one part in `keyframes of the
-// window` is kept for good.
+// State: delta = (log focal scale, cx, cy, k1), relative to the given calibration; k1 is the first radial
+// coefficient of either camera model. Every local BA leaves a quadratic in delta after poses and inverse
+// depths are eliminated. Windows overlap, so a measurement would be counted once a window: of each quadratic
+// one part in `keyframes of the window` is kept for good.
 #pragma once
 
 #include <vector>
@@ -26,9 +26,11 @@ class Calibrator {
  public:
   Calibrator(const CalibrationConfig& config, const Camera& given);
 
-  // Uses a window at the optimum of its poses and inverse depths. d_bearing_d_pixel: of every point, at its host pixel,
-  // anchor axes. True where the estimate moved noticeably and camera() should be used from now on.
-  bool update(const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing_d_pixel);
+  // Uses a window at the optimum of its poses and inverse depths. d_bearing_d_pixel: of every point, at its
+  // host pixel, anchor axes. True where the estimate moved noticeably and camera() should be used from now
+  // on.
+  bool update(const BundleProblem& problem,
+              const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing_d_pixel);
 
   [[nodiscard]] const CalibrationDelta& delta() const { return delta_; }
   // 1 sigma of delta.
@@ -38,7 +40,7 @@ class Calibrator {
  private:
   struct Quadratic {
     Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d g = Eigen::Vector4d::Zero();    // gradient at the present delta
+    Eigen::Vector4d g = Eigen::Vector4d::Zero();  // gradient at the present delta
     bool usable = false;
   };
   [[nodiscard]] Quadratic window_information(const BundleProblem& problem,

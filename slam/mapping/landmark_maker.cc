@@ -12,12 +12,13 @@ namespace farpoint::slam {
 namespace {
 
 constexpr double kChi2TwoDof = 5.99;
-// Depth of the nearest points searched for, as a share of the median depth of what the keyframe sees: nearer ones
-// leave the image before they are of use.
+// Depth of the nearest points searched for, as a share of the median depth of what the keyframe sees: nearer
+// ones leave the image before they are of use.
 constexpr double kNearShare = 0.15;
 // A feature pair whose depth says it should look so much larger or smaller than it does is a mismatch.
 constexpr double kScaleTolerance = 1.8;
-// Orientation of a corner repeats to about 10 degrees; three times that, with the frame's roll taken as small.
+// Orientation of a corner repeats to about 10 degrees; three times that, with the frame's roll taken as
+// small.
 constexpr float kMaxAngleDifference_rad = 0.6F;
 // Poses of neighbouring keyframes are known to about this much in the image.
 constexpr double kPoseSigma_px = 0.5;
@@ -108,8 +109,8 @@ int LandmarkMaker::search_epipolar(const Keyframe& newer, std::size_t feature, c
     const Eigen::Vector2d middle = a + 0.5 * (from + to) * unit;
     const auto radius = static_cast<float>(0.5 * (to - from)) + band_px;
     older.grid.visit_near(
-        older.set.features, static_cast<float>(middle.x()), static_cast<float>(middle.y()), radius, f.level - 3,
-        f.level + 3, [&](std::size_t i) {
+        older.set.features, static_cast<float>(middle.x()), static_cast<float>(middle.y()), radius,
+        f.level - 3, f.level + 3, [&](std::size_t i) {
           const Feature& o = older.set.features[i];
           const Eigen::Vector2d d = Eigen::Vector2d(o.u_px, o.v_px) - a;
           const double t = d.dot(unit);
@@ -119,10 +120,12 @@ int LandmarkMaker::search_epipolar(const Keyframe& newer, std::size_t feature, c
           const int h = hamming_distance(newer.set.descriptors[feature], older.set.descriptors[i]);
           if (static_cast<int>(i) == best) return;
           if (h < best_distance) {
-            if (best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o)) second = best_distance;
+            if (best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o))
+              second = best_distance;
             best_distance = h;
             best = static_cast<int>(i);
-          } else if (h < second && best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o)) {
+          } else if (h < second && best >= 0 &&
+                     !same_place(older.set.features[static_cast<std::size_t>(best)], o)) {
             second = h;
           }
         });
@@ -175,7 +178,8 @@ void LandmarkMaker::consume(KeyframeHandle newer, KeyframeHandle older, const Pa
   }
 }
 
-void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& g, const Pair& pair) {
+void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& g,
+                           const Pair& pair) {
   const Keyframe& k_new = map_.keyframes()[newer];
   const Keyframe& k_old = map_.keyframes()[older];
   const Eigen::Vector3d f_new = k_new.bearings[pair.feature_new].cast<double>();
@@ -191,7 +195,8 @@ void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const Pai
   l.inverse_depth = first.ok ? std::max(0.0, first.inverse_depth) : 0.0;
   l.created_keyframe = k_new.id;
   Observation o;
-  if (!measure_observation(config_, map_, l, newer, pair.feature_new, &o) || !map_.add_observation(handle, o)) {
+  if (!measure_observation(config_, map_, l, newer, pair.feature_new, &o) ||
+      !map_.add_observation(handle, o)) {
     map_.remove_landmark(handle);
     return;
   }
@@ -208,7 +213,8 @@ void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const Pai
 void LandmarkMaker::attach(LandmarkHandle handle, KeyframeHandle keyframe, std::size_t feature) {
   const Landmark& l = map_.landmarks()[handle];
   Observation o;
-  if (!measure_observation(config_, map_, l, keyframe, feature, &o) || !map_.add_observation(handle, o)) return;
+  if (!measure_observation(config_, map_, l, keyframe, feature, &o) || !map_.add_observation(handle, o))
+    return;
   ++counts_.vmp_attached;
   try_promote(handle, true);
 }
@@ -220,8 +226,8 @@ void LandmarkMaker::merge(LandmarkHandle into, LandmarkHandle from) {
   for (const Observation& o : source.observations) {
     if (o.feature < 0 || Map::find_observation(map_.landmarks()[into], o.keyframe) != nullptr) continue;
     Observation measured;
-    if (!measure_observation(config_, map_, map_.landmarks()[into], o.keyframe, static_cast<std::size_t>(o.feature),
-                             &measured))
+    if (!measure_observation(config_, map_, map_.landmarks()[into], o.keyframe,
+                             static_cast<std::size_t>(o.feature), &measured))
       return;
     moved.push_back(measured);
   }
@@ -294,9 +300,10 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
 }
 
 bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
-  // The same angle in every mode, so that the comparison is of the virtual points alone: they reach it over pairs of
-  // keyframes that are never matched with each other. (Promotion by sigma alone, short of the angle, made KITTI 03 half
-  // worse by a tenth to a fifth: a point that is promoted when its noise makes it look near is one that looks near.)
+  // The same angle in every mode, so that the comparison is of the virtual points alone: they reach it over
+  // pairs of keyframes that are never matched with each other. (Promotion by sigma alone, short of the angle,
+  // made KITTI 03 half worse by a tenth to a fifth: a point that is promoted when its noise makes it look
+  // near is one that looks near.)
   return l.max_parallax_rad > config_.landmarks.promote_parallax_rad &&
          fit.sigma < config_.landmarks.promote_relative_sigma * fit.inverse_depth;
 }
@@ -323,7 +330,8 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   const Observation& newest = l.observations.back();
   const Keyframe& k = map_.keyframes()[newest.keyframe];
   const SE3 T_camera_anchor = map_.T_world_camera(k).inverse() * map_.T_world_anchor(l);
-  const double scale_change = 1.0 / (T_camera_anchor.q * l.bearing + l.inverse_depth * T_camera_anchor.t).norm();
+  const double scale_change =
+      1.0 / (T_camera_anchor.q * l.bearing + l.inverse_depth * T_camera_anchor.t).norm();
   const int level = k.set.features[static_cast<std::size_t>(newest.feature)].level;
   const double seen_change = std::pow(config_.pyramid.scale_factor, level - l.host_level);
   const double ratio = scale_change / seen_change;

@@ -1,6 +1,6 @@
-// Algorithm 1 of Dou et al. 2024 as METHOD.md reads it: feature pairs between a new keyframe and its neighbours become
-// map points at once where the parallax suffices, and virtual map points (VMP, here landmarks of state `bearing`) that
-// wait for parallax where it does not.
+// Algorithm 1 of Dou et al. 2024 as METHOD.md reads it: feature pairs between a new keyframe and its
+// neighbours become map points at once where the parallax suffices, and virtual map points (VMP, here
+// landmarks of state `bearing`) that wait for parallax where it does not.
 #pragma once
 
 #include <vector>
@@ -15,13 +15,14 @@ class LandmarkMaker {
  public:
   LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts);
 
-  // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes landmarks.
+  // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes
+  // landmarks.
   void process(KeyframeHandle keyframe, const std::vector<KeyframeHandle>& neighbours);
   // Gives back the slots of VMPs not seen for a while, and of the least useful ones beyond the limit.
   void evict_bearings(KeyframeHandle newest);
 
-  // Inverse depth from every observation, given the poses. False where it is behind a camera or an observation
-  // disagrees (chi-square); *worst is then the one that disagrees most.
+  // Inverse depth from every observation, given the poses. False where it is behind a camera or an
+  // observation disagrees (chi-square); *worst is then the one that disagrees most.
   struct DepthFit {
     bool ok = false;
     double inverse_depth = 0, sigma = 0, max_chi2 = 0;
@@ -36,16 +37,17 @@ class LandmarkMaker {
     int distance = 0;
   };
   struct PairGeometry {
-    SE3 T_new_old;                  // cameras
-    Eigen::Vector3d epipole_old;    // centre of the new camera seen from the old one
-    double max_inverse_depth = 0;   // nearest depth searched
+    SE3 T_new_old;                 // cameras
+    Eigen::Vector3d epipole_old;   // centre of the new camera seen from the old one
+    double max_inverse_depth = 0;  // nearest depth searched
     bool valid = false;
   };
 
   [[nodiscard]] PairGeometry relate(const Keyframe& newer, const Keyframe& older) const;
-  void find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry, std::vector<Pair>* out);
-  int search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older, const PairGeometry& geometry,
-                      int* distance) const;
+  void find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
+                  std::vector<Pair>* out);
+  int search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older,
+                      const PairGeometry& geometry, int* distance) const;
   void consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
   void create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
   void attach(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature);
@@ -58,7 +60,7 @@ class LandmarkMaker {
   Map& map_;
   MappingCounts& counts_;
   std::vector<Pair> pairs_;
-  std::vector<int> best_of_old_;      // one a feature of the older keyframe: index in pairs_
+  std::vector<int> best_of_old_;  // one a feature of the older keyframe: index in pairs_
 };
 
 }  // namespace farpoint::slam

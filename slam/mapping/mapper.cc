@@ -10,11 +10,12 @@ namespace farpoint::slam {
 
 namespace {
 
-// A landmark on probation goes when it was found in fewer than this share of the frames that should have shown it.
+// A landmark on probation goes when it was found in fewer than this share of the frames that should have
+// shown it.
 constexpr double kMinFoundShare = 0.25;
 constexpr std::uint64_t kProbation_keyframes = 3;
-// After residuals that nothing explains, so many sound optimisations in a row before poses are called valid again, in a
-// new map too: what bent the one is there in the other.
+// After residuals that nothing explains, so many sound optimisations in a row before poses are called valid
+// again, in a new map too: what bent the one is there in the other.
 constexpr int kTrustedRun = 10;
 
 }  // namespace
@@ -88,13 +89,15 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
   map_.update_covisibility(second);
   optimise(second, 20);
   std::size_t alive = 0;
-  map_.landmarks().for_each([&](LandmarkHandle, const Landmark& l) { alive += l.map_id == map_id ? 1U : 0U; });
+  map_.landmarks().for_each(
+      [&](LandmarkHandle, const Landmark& l) { alive += l.map_id == map_id ? 1U : 0U; });
   if (alive < static_cast<std::size_t>(config_.initialisation.min_landmarks) / 2) {
     map_.discard_map(map_id);
     return nullptr;
   }
   map_.landmarks().for_each([&](LandmarkHandle, Landmark& l) {
-    if (l.map_id == map_id) l.creation_relative_sigma = l.inverse_depth_sigma / std::max(l.inverse_depth, 1e-9);
+    if (l.map_id == map_id)
+      l.creation_relative_sigma = l.inverse_depth_sigma / std::max(l.inverse_depth, 1e-9);
   });
   return make_view(second);
 }
@@ -158,7 +161,8 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
     const std::uint64_t id = map_.keyframes()[keyframe].id;
     for (const LandmarkHandle& h : map_.keyframes()[keyframe].landmarks) {
       const Landmark* l = map_.landmarks().get(h);
-      if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == id) recent_.push_back(h);
+      if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == id)
+        recent_.push_back(h);
     }
   }
   map_.update_covisibility(keyframe);
@@ -178,7 +182,8 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   return make_view(newest_);
 }
 
-// ---------------------------------------------------------------------------------------------------- duplicates
+// ----------------------------------------------------------------------------------------------------
+// duplicates
 
 void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
   // The other's measurements are of the other's patch: each is made anew with the patch that stays.
@@ -204,9 +209,11 @@ void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle
   const double scale_factor = config_.pyramid.scale_factor;
   for (const LandmarkHandle& lh : landmarks) {
     const Landmark* l = map_.landmarks().get(lh);
-    if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr) continue;
+    if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr)
+      continue;
     Prediction p;
-    if (!predict(prediction_input(map_, *l), camera, T_camera_world, 4.0, &p) || p.view_cosine < 0.5) continue;
+    if (!predict(prediction_input(map_, *l), camera, T_camera_world, 4.0, &p) || p.view_cosine < 0.5)
+      continue;
     if (p.scale_change < 0.3F || p.scale_change > 3.3F) continue;
     const int level = predicted_level(l->host_level, p.scale_change, static_cast<float>(scale_factor),
                                       config_.pyramid.levels);
@@ -259,7 +266,8 @@ void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
   search_into(keyframe, theirs);
 }
 
-// ------------------------------------------------------------------------------------------------------ local BA
+// ------------------------------------------------------------------------------------------------------
+// local BA
 
 void Mapper::select_window(KeyframeHandle centre) {
   window_.assign(1, centre);
@@ -351,16 +359,16 @@ void Mapper::optimise(KeyframeHandle centre, int iterations) {
   if (problem_.points.empty()) return;
   BundleOptions options;
   options.iterations = iterations;
-  const BundleSummary summary = config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_)
-                                                                  : solve_schur(options, &problem_);
+  const BundleSummary summary =
+      config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solve_schur(options, &problem_);
   ++counts_.local_ba;
   if (!summary.usable) return;
   take_back();
 }
 
 void Mapper::refine_calibration() {
-  // Poses and depths are at their optimum for the present calibration: what is left in the residuals is noise, or a
-  // calibration that is not quite right.
+  // Poses and depths are at their optimum for the present calibration: what is left in the residuals is
+  // noise, or a calibration that is not quite right.
   std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size());
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
     if (const Landmark* l = map_.landmarks().get(problem_landmarks_[i])) d_bearing[i] = l->d_bearing_d_pixel;
@@ -380,7 +388,8 @@ void Mapper::take_back() {
     const BundleProblem::Point& point = problem_.points[i];
     const LandmarkHandle lh = problem_landmarks_[i];
     Landmark& l = map_.landmarks()[lh];
-    if (l.inverse_depth > 0.0 && point.inverse_depth > 0.0) changes.push_back(point.inverse_depth / l.inverse_depth);
+    if (l.inverse_depth > 0.0 && point.inverse_depth > 0.0)
+      changes.push_back(point.inverse_depth / l.inverse_depth);
     l.inverse_depth = point.inverse_depth;
     l.inverse_depth_sigma = point.inverse_depth_sigma;
     outliers.clear();
@@ -401,15 +410,15 @@ void Mapper::take_back() {
 }
 
 void Mapper::update_settling(double scale_change) {
-  // The unit of a young map follows its first baseline, which is known worst of all. It has settled when three
-  // optimisations in a row moved it by less than two per cent each, and left residuals that the measurements' errors
-  // explain.
+  // The unit of a young map follows its first baseline, which is known worst of all. It has settled when
+  // three optimisations in a row moved it by less than two per cent each, and left residuals that the
+  // measurements' errors explain.
   constexpr double kSteady = 0.02;
   constexpr int kSteadyOptimisations = 3;
   const bool steady = std::fabs(std::log(scale_change)) < kSteady;
   if (!consistent()) {
-    // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its poses are
-    // not what they claim, however many inliers they have.
+    // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its
+    // poses are not what they claim, however many inliers they have.
     settled_ = false;
     steady_optimisations_ = 0;
     consistent_run_ = 0;
@@ -421,9 +430,9 @@ void Mapper::update_settling(double scale_change) {
 }
 
 bool Mapper::consistent() const {
-  // Mean chi-square of a measurement (two degrees of freedom), outliers cut off. The floor of an aligned measurement's
-  // sigma (tracking.pixel_sigma_px) is about twice the error seen on rigid scenes with a global shutter, so that a
-  // sound map shows 0.4 to 0.9; one that rolling shutter has bent shows 1.5 to 3.
+  // Mean chi-square of a measurement (two degrees of freedom), outliers cut off. The floor of an aligned
+  // measurement's sigma (tracking.pixel_sigma_px) is about twice the error seen on rigid scenes with a global
+  // shutter, so that a sound map shows 0.4 to 0.9; one that rolling shutter has bent shows 1.5 to 3.
   constexpr double kCutOff = 20.0;
   constexpr double kConsistent = 1.2;
   if (problem_.measurements.empty()) return true;
@@ -432,14 +441,16 @@ bool Mapper::consistent() const {
   return sum < kConsistent * static_cast<double>(problem_.measurements.size());
 }
 
-// ------------------------------------------------------------------------------------------------------- forgetting
+// -------------------------------------------------------------------------------------------------------
+// forgetting
 
 void Mapper::cull_keyframes(KeyframeHandle newest) {
   // Redundant: nine tenths of what it sees, three others see at least as finely.
   constexpr double kRedundant = 0.9;
   constexpr int kOthers = 3;
   constexpr std::uint64_t kKeepNewest = 3;
-  for (const KeyframeHandle& h : neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
+  for (const KeyframeHandle& h :
+       neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
     const Keyframe& k = map_.keyframes()[h];
     if (k.id + kKeepNewest > newest_id_) continue;
     int points = 0, redundant = 0;
@@ -451,7 +462,8 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
       for (const Observation& o : l->observations) {
         if (o.keyframe == h) continue;
         const Keyframe& other = map_.keyframes()[o.keyframe];
-        if (other.set.features[static_cast<std::size_t>(o.feature)].level <= k.set.features[i].level + 1) ++others;
+        if (other.set.features[static_cast<std::size_t>(o.feature)].level <= k.set.features[i].level + 1)
+          ++others;
         if (others >= kOthers) break;
       }
       if (others >= kOthers) ++redundant;
@@ -484,7 +496,8 @@ void Mapper::limit_memory(KeyframeHandle newest) {
     const std::vector<LandmarkHandle> seen = map_.keyframes()[oldest].landmarks;
     for (const LandmarkHandle& h : seen) {
       const Landmark* l = map_.landmarks().get(h);
-      if (l != nullptr && l->last_seen_keyframe + images < newest_id_) map_.remove_landmark(h), ++counts_.landmarks_culled;
+      if (l != nullptr && l->last_seen_keyframe + images < newest_id_)
+        map_.remove_landmark(h), ++counts_.landmarks_culled;
     }
     map_.remove_keyframe(oldest);
     ++counts_.keyframes_culled;
@@ -492,7 +505,8 @@ void Mapper::limit_memory(KeyframeHandle newest) {
   }
 }
 
-// ------------------------------------------------------------------------------------------------------------- view
+// -------------------------------------------------------------------------------------------------------------
+// view
 
 std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
   auto view = std::make_shared<LocalView>();
@@ -540,7 +554,8 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       v.confirmed = l->state == LandmarkState::kFull || l->observations.size() > 2;
       if (v.in_reference) {
         if (v.confirmed) ++view->reference_landmarks;
-        const double d = (T_reference_world.q * v.point_w.head<3>() + v.point_w[3] * T_reference_world.t).norm();
+        const double d =
+            (T_reference_world.q * v.point_w.head<3>() + v.point_w[3] * T_reference_world.t).norm();
         depths.push_back(d / std::max(v.point_w[3], 1e-9));
       }
       view->landmarks.push_back(v);
@@ -548,7 +563,8 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
   }
   std::sort(view->keyframes.begin(), view->keyframes.end(),
             [](const ViewKeyframe& a, const ViewKeyframe& b) { return a.id < b.id; });
-  map_.keyframes().for_each([&](KeyframeHandle, const Keyframe& k) { view->map_keyframes += k.map_id == centre.map_id; });
+  map_.keyframes().for_each(
+      [&](KeyframeHandle, const Keyframe& k) { view->map_keyframes += k.map_id == centre.map_id; });
   if (!depths.empty()) {
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());

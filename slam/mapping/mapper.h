@@ -1,7 +1,7 @@
 // Keyframes in, local views out. The only writer of the map.
 //
-// One keyframe is two jobs: insert() ends with the quick view (new landmarks, poses not yet optimised), refine() with
-// the full one (duplicates fused, local BA, culling).
+// One keyframe is two jobs: insert() ends with the quick view (new landmarks, poses not yet optimised),
+// refine() with the full one (duplicates fused, local BA, culling).
 #pragma once
 
 #include <memory>
@@ -9,13 +9,13 @@
 #include <span>
 #include <vector>
 
+#include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
 #include "slam/mapping/bundle_problem.h"
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/statistics.h"
-#include "slam/map/frame.h"
 
 namespace farpoint::slam {
 
@@ -71,18 +71,18 @@ class Mapper {
   KeyframeHandle newest_;
   std::uint64_t newest_id_ = 0;
   std::uint64_t view_sequence_ = 0;
-  std::vector<LandmarkHandle> recent_;    // made not long ago, on probation
+  std::vector<LandmarkHandle> recent_;  // made not long ago, on probation
 
   // Settling: how much the last optimisations still changed the young map's unit.
   int steady_optimisations_ = 0;
   bool settled_ = false;
-  int consistent_run_;                    // sound optimisations since the last that was not
+  int consistent_run_;  // sound optimisations since the last that was not
 
   // Work space of local BA.
   BundleProblem problem_;
   std::vector<KeyframeHandle> window_, fixed_;
   std::vector<LandmarkHandle> problem_landmarks_;
-  std::vector<int> pose_index_;           // one a keyframe slot: index in problem_.poses, or -1
+  std::vector<int> pose_index_;  // one a keyframe slot: index in problem_.poses, or -1
 };
 
 }  // namespace farpoint::slam

@@ -11,11 +11,12 @@ constexpr float kSearchLevelPixels = 2.0F;
 
 PredictionInput prediction_input(const Map& map, const Landmark& landmark) {
   const SE3 T_world_anchor = map.T_world_anchor(landmark);
-  return {map.world_point(landmark), T_world_anchor.t, T_world_anchor.rotation() * landmark.d_bearing_d_pixel};
+  return {map.world_point(landmark), T_world_anchor.t,
+          T_world_anchor.rotation() * landmark.d_bearing_d_pixel};
 }
 
-bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark, KeyframeHandle handle,
-                         std::size_t feature, Observation* out) {
+bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark,
+                         KeyframeHandle handle, std::size_t feature, Observation* out) {
   const Keyframe& keyframe = map.keyframes()[handle];
   const Camera& camera = map.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
   const Feature& f = keyframe.set.features[feature];
@@ -23,7 +24,8 @@ bool measure_observation(const EstimatorConfig& config, const Map& map, const La
   *out = {handle, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, scale};
   if (!keyframe.image) return false;
   Prediction p;
-  if (!predict(prediction_input(map, landmark), camera, map.T_world_camera(keyframe).inverse(), 0.0, &p)) return false;
+  if (!predict(prediction_input(map, landmark), camera, map.T_world_camera(keyframe).inverse(), 0.0, &p))
+    return false;
   const Alignment a =
       keyframe.image->align(landmark.patch, p.A_target_host, out->pixel, kSearchLevelPixels * scale);
   if (!a.ok) return false;

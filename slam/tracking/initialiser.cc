@@ -9,14 +9,14 @@ namespace farpoint::slam {
 
 namespace {
 
-// A corner moves less than this share of the image's width from frame to frame; later searches start where the last
-// one found it.
+// A corner moves less than this share of the image's width from frame to frame; later searches start where
+// the last one found it.
 constexpr float kFirstWindow = 0.08F;
 constexpr int kMinMatches = 80;
-// Descriptors find a tenth of the corners again in any picture of the same kind: below this share chance matches
-// prevail.
+// Descriptors find a tenth of the corners again in any picture of the same kind: below this share chance
+// matches prevail.
 constexpr double kMinMatchShare = 0.2;
-constexpr double kCornerSigma_px = 1.0;    // corners are not aligned yet
+constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
 constexpr std::size_t kHistoryFrames = 60;
 
 }  // namespace
@@ -54,7 +54,8 @@ void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
     q.max_hamming = config_.tracking.max_hamming * 3 / 4;
     q.ratio = 0.85F;
     int distance = 0;
-    const int j = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; }, &distance);
+    const int j = find_descriptor(
+        frame.set, frame.grid, q, [](std::size_t) { return true; }, &distance);
     if (j < 0) continue;
     const auto ju = static_cast<std::size_t>(j);
     if (distance >= owner_distance[ju]) continue;
@@ -80,7 +81,8 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
     const Feature& a = reference_->set.features[p.feature_first];
     const Feature& b = frame->set.features[p.feature_second];
     Eigen::Vector3d ba, bb;
-    if (!camera.camera.unproject({a.u_px, a.v_px}, &ba) || !camera.camera.unproject({b.u_px, b.v_px}, &bb)) continue;
+    if (!camera.camera.unproject({a.u_px, a.v_px}, &ba) || !camera.camera.unproject({b.u_px, b.v_px}, &bb))
+      continue;
     first.push_back(ba);
     second.push_back(bb);
     used.push_back(p);
@@ -89,14 +91,17 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
   if (r.status != TwoViewStatus::kOk) return {};
   // A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough.
   const auto wide = std::count_if(r.parallax_rad.begin(), r.parallax_rad.end(), [&](const double& p) {
-    return p > config_.initialisation.min_parallax_rad && r.inlier[static_cast<std::size_t>(&p - r.parallax_rad.data())] != 0;
+    return p > config_.initialisation.min_parallax_rad &&
+           r.inlier[static_cast<std::size_t>(&p - r.parallax_rad.data())] != 0;
   });
-  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks, static_cast<std::ptrdiff_t>(r.inliers / 4)))
+  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks,
+                                      static_cast<std::ptrdiff_t>(r.inliers / 4)))
     return {};
   InitialPair pair;
   pair.first = reference_;
   pair.second = frame;
-  // T_2_1 is between cameras; with an unknown scale the lever arm to the body is zero by definition (config.h).
+  // T_2_1 is between cameras; with an unknown scale the lever arm to the body is zero by definition
+  // (config.h).
   const SE3 T_c1_c2 = r.T_2_1.inverse();
   pair.T_first_second = camera.T_body_camera * T_c1_c2 * camera.T_body_camera.inverse();
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -120,8 +125,8 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
   const std::size_t fewer = std::min(reference_->set.features.size(), frame->set.features.size());
   const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * static_cast<double>(fewer)));
   if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
-    // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well, or there is
-    // none, this one.
+    // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,
+    // or there is none, this one.
     const std::uint64_t half = reference_->number + (age + 1) / 2;
     const auto next = std::find_if(history_.begin(), history_.end(),
                                    [&](const std::shared_ptr<Frame>& f) { return f->number >= half; });

@@ -1,5 +1,5 @@
-// Waits for two frames whose matches say how the camera moved and where the points are. Invents nothing: rotation alone,
-// a plane that can be read two ways, or too little parallax mean waiting.
+// Waits for two frames whose matches say how the camera moved and where the points are. Invents nothing:
+// rotation alone, a plane that can be read two ways, or too little parallax mean waiting.
 #pragma once
 
 #include <deque>
@@ -29,13 +29,14 @@ class Initialiser {
   };
   void set_reference(std::shared_ptr<Frame> frame);
   void match(const Frame& frame, std::vector<Pairing>* out);
-  std::optional<InitialPair> solve(const std::shared_ptr<Frame>& frame, const std::vector<Pairing>& pairs) const;
+  std::optional<InitialPair> solve(const std::shared_ptr<Frame>& frame,
+                                   const std::vector<Pairing>& pairs) const;
 
   const EstimatorConfig config_;
   const Rig rig_;
   std::deque<std::shared_ptr<Frame>> history_;
   std::shared_ptr<Frame> reference_;
-  std::vector<Eigen::Vector2f> expected_px_;    // where each reference feature was seen last
+  std::vector<Eigen::Vector2f> expected_px_;  // where each reference feature was seen last
   std::vector<Pairing> pairs_;
   int last_matches_ = 0;
 };

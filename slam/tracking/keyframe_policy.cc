@@ -12,7 +12,8 @@ bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const 
   const bool old = situation.frames_since_keyframe >= config.keyframes.max_interval_frames;
   const bool thin = outcome.reference_inliers < config.keyframes.tracked_ratio * view.reference_landmarks;
   const bool very_thin = outcome.reference_inliers < 0.5 * view.reference_landmarks;
-  // Standing still nothing is new, however old the keyframe; turning on the spot only what leaves the image counts.
+  // Standing still nothing is new, however old the keyframe; turning on the spot only what leaves the image
+  // counts.
   return moved || (old && drifted) || (thin && drifted) || very_thin;
 }
 

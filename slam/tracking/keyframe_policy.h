@@ -9,10 +9,10 @@ namespace farpoint::slam {
 
 struct KeyframeSituation {
   int frames_since_keyframe = 0;
-  bool mapping_free = false;    // mapping could start on it at once
+  bool mapping_free = false;  // mapping could start on it at once
 };
 
-[[nodiscard]] bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const TrackOutcome& outcome,
-                                  const KeyframeSituation& situation);
+[[nodiscard]] bool wants_keyframe(const EstimatorConfig& config, const LocalView& view,
+                                  const TrackOutcome& outcome, const KeyframeSituation& situation);
 
 }  // namespace farpoint::slam

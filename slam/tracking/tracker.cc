@@ -10,11 +10,13 @@ namespace farpoint::slam {
 namespace {
 
 constexpr double kBorderPx = 4.0;
-constexpr double kMinViewCosine = 0.5;    // 60 degrees from the anchor's view a patch looks different
+constexpr double kMinViewCosine = 0.5;  // 60 degrees from the anchor's view a patch looks different
 // Sizes beyond these cannot be matched: the patch has no pixels left, or too few.
 constexpr float kMinScaleChange = 0.3F, kMaxScaleChange = 3.3F;
 
-bool scale_fits(float change) { return change > kMinScaleChange && change < kMaxScaleChange; }
+bool scale_fits(float change) {
+  return change > kMinScaleChange && change < kMaxScaleChange;
+}
 
 }  // namespace
 
@@ -71,7 +73,8 @@ void Tracker::project_view(const Frame& frame, const SE3& T_world_body, std::vec
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
     const ViewLandmark& l = view_->landmarks[i];
     Candidate c;
-    if (!predict({l.point_w, l.anchor_w, l.d_point_d_pixel}, camera.camera, T_camera_world, kBorderPx, &c.prediction))
+    if (!predict({l.point_w, l.anchor_w, l.d_point_d_pixel}, camera.camera, T_camera_world, kBorderPx,
+                 &c.prediction))
       continue;
     if (c.prediction.view_cosine < kMinViewCosine || !scale_fits(c.prediction.scale_change)) continue;
     c.view_index = static_cast<std::uint32_t>(i);
@@ -92,7 +95,8 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
     if (matched[c.view_index] != 0) continue;
     if (last_frame_only && seen_last_frame_[c.view_index] == 0) continue;
     // What the depth leaves open widens the window.
-    const double depth_px = std::min(20.0, 2.0 * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
+    const double depth_px =
+        std::min(20.0, 2.0 * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
     DescriptorQuery q;
     q.descriptor = l.descriptor;
     q.u_px = static_cast<float>(c.prediction.pixel.x());
@@ -102,7 +106,8 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
     q.max_level = c.level + 1;
     q.max_hamming = config_.tracking.max_hamming;
     q.ratio = ratio;
-    const int feature = find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return feature_match_[f] < 0; });
+    const int feature =
+        find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return feature_match_[f] < 0; });
     if (feature < 0) continue;
     const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
     Match m;
@@ -162,7 +167,8 @@ PoseSolution Tracker::pose_from_matches(const Frame& frame, const SE3& start) {
   return s;
 }
 
-// First pose: the landmarks of the last frame near where the prior expects them, then further away, then the whole view.
+// First pose: the landmarks of the last frame near where the prior expects them, then further away, then the
+// whole view.
 bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
   project_view(frame, *T_world_body, &candidates_);
   const double base = config_.tracking.prior_search_px;
@@ -174,11 +180,13 @@ bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
   for (const Attempt& a : attempts) {
     matches_.clear();
     std::fill(feature_match_.begin(), feature_match_.end(), -1);
-    if (match_candidates(frame, candidates_, a.radius_px, 0.9F, a.last_frame_only) < config_.tracking.min_matches)
+    if (match_candidates(frame, candidates_, a.radius_px, 0.9F, a.last_frame_only) <
+        config_.tracking.min_matches)
       continue;
     const PoseSolution s = pose_from_matches(frame, *T_world_body);
     // Half of what was matched must agree: a pose that explains a fifth of the matches explains nothing.
-    if (s.inliers >= config_.tracking.min_matches / 2 && 2 * s.inliers >= static_cast<int>(matches_.size()) && s.ok) {
+    if (s.inliers >= config_.tracking.min_matches / 2 && 2 * s.inliers >= static_cast<int>(matches_.size()) &&
+        s.ok) {
       *T_world_body = s.T_world_body;
       return true;
     }
@@ -239,11 +247,14 @@ double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_bo
   }
   (void)T_c_w;
   if (motions.empty()) return 0.0;
-  std::nth_element(motions.begin(), motions.begin() + static_cast<std::ptrdiff_t>(motions.size() / 2), motions.end());
+  std::nth_element(motions.begin(), motions.begin() + static_cast<std::ptrdiff_t>(motions.size() / 2),
+                   motions.end());
   return motions[motions.size() / 2];
 }
 
-TrackOutcome Tracker::track(const Frame& frame) { return track_from(frame, predict_pose(frame.utime)); }
+TrackOutcome Tracker::track(const Frame& frame) {
+  return track_from(frame, predict_pose(frame.utime));
+}
 
 TrackOutcome Tracker::track_from(const Frame& frame, const SE3& prior) {
   feature_match_.assign(frame.set.features.size(), -1);

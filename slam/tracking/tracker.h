@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/predict.h"
-#include "slam/map/frame.h"
 #include "slam/tracking/pose_solver.h"
 
 namespace farpoint::slam {
@@ -23,14 +23,14 @@ struct Match {
 };
 
 struct TrackOutcome {
-  bool ok = false;                // a pose that may be used
+  bool ok = false;  // a pose that may be used
   SE3 T_world_body;
   Matrix6d covariance = Matrix6d::Zero();
-  int matches = 0;                // after the local search
-  int inliers = 0, aligned = 0;   // of the final pose
-  int reference_inliers = 0;      // inliers among the reference keyframe's landmarks
-  int expected = 0;               // landmarks that project into the image
-  double median_motion_px = 0;    // of inliers against the reference keyframe, rotation taken out
+  int matches = 0;               // after the local search
+  int inliers = 0, aligned = 0;  // of the final pose
+  int reference_inliers = 0;     // inliers among the reference keyframe's landmarks
+  int expected = 0;              // landmarks that project into the image
+  double median_motion_px = 0;   // of inliers against the reference keyframe, rotation taken out
   double rms = 0;
 };
 
@@ -74,8 +74,8 @@ class Tracker {
   [[nodiscard]] SE3 predict_pose(std::int64_t utime) const;
   void project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const;
   bool coarse_pose(const Frame& frame, SE3* T_world_body);
-  int match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px, float ratio,
-                       bool last_frame_only);
+  int match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px,
+                       float ratio, bool last_frame_only);
   void align_matches(const Frame& frame, const std::vector<Candidate>& candidates);
   PoseSolution pose_from_matches(const Frame& frame, const SE3& start);
   TrackOutcome fine_pose(const Frame& frame, const SE3& start);
@@ -93,11 +93,11 @@ class Tracker {
   // Work space, reused.
   std::vector<Candidate> candidates_;
   std::vector<Match> matches_;
-  std::vector<std::int32_t> feature_match_;        // one a feature: index in matches_, or -1
+  std::vector<std::int32_t> feature_match_;  // one a feature: index in matches_, or -1
   std::vector<PoseMeasurement> measurements_;
-  std::vector<LandmarkHandle> last_seen_;          // inliers of the last accepted frame
-  std::vector<std::uint8_t> seen_last_frame_;      // one a view landmark
-  std::vector<SightingCount> counts_;              // one a landmark slot of the map
+  std::vector<LandmarkHandle> last_seen_;      // inliers of the last accepted frame
+  std::vector<std::uint8_t> seen_last_frame_;  // one a view landmark
+  std::vector<SightingCount> counts_;          // one a landmark slot of the map
   std::vector<std::uint32_t> counted_slots_;
 };
 

@@ -35,7 +35,8 @@ TEST(Alignment, RecoversSimilaritiesAndRigidMotions) {
       source.push_back(centre + p);
       target.push_back(truth * source.back());
     }
-    const PointAlignment found = align_points(source, target, metric ? AlignmentKind::kSe3 : AlignmentKind::kSim3);
+    const PointAlignment found =
+        align_points(source, target, metric ? AlignmentKind::kSe3 : AlignmentKind::kSim3);
     ASSERT_TRUE(found.ok);
     EXPECT_NEAR(found.S_target_source.scale / truth.scale, 1.0, 1e-10);
     EXPECT_LT((found.S_target_source.q.toRotationMatrix() - truth.q.toRotationMatrix()).norm(), 1e-9);
