@@ -61,9 +61,9 @@ struct KeyframeConfig {
 
 struct LandmarkConfig {
   LandmarkMode mode = LandmarkMode::kVmp;
-  double promote_parallax_rad = 0.020;  // largest parallax must be above it: acos(0.9998), as in the paper
-  double promote_relative_sigma = 0.3;  // sigma(inverse depth) / inverse depth must be below it
-  int max_bearing = 4000;               // candidates alive at once
+  double promote_parallax_rad = 0.020;   // largest parallax: acos(0.9998), as in the paper
+  double promote_relative_sigma = 0.05;  // vmp: sigma(inverse depth) / inverse depth
+  int max_bearing = 4000;                // candidates alive at once
 };
 
 struct MappingConfig {

@@ -300,11 +300,13 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
 }
 
 bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
-  // The same angle in every mode, so that the comparison is of the virtual points alone: they reach it over
-  // pairs of keyframes that are never matched with each other. (Promotion by sigma alone, short of the angle,
-  // made KITTI 03 half worse by a tenth to a fifth: a point that is promoted when its noise makes it look
-  // near is one that looks near.)
-  return l.max_parallax_rad > config_.landmarks.promote_parallax_rad &&
+  const bool wide = l.max_parallax_rad > config_.landmarks.promote_parallax_rad;
+  if (wide || config_.landmarks.mode == LandmarkMode::kBaseline) return wide;
+  // Short of the angle a virtual point is as good a point once three keyframes or more agree on its depth as
+  // well as two under the angle would: a mismatch along the epipolar line does not survive the third. (A
+  // laxer bound, 0.15, made KITTI 03 half worse by a tenth to a fifth: what is promoted when its noise makes
+  // it look near, looks near.)
+  return l.observations.size() >= 3 &&
          fit.sigma < config_.landmarks.promote_relative_sigma * fit.inverse_depth;
 }
 
