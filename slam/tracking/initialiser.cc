@@ -13,9 +13,9 @@ namespace {
 // the last one found it.
 constexpr float kFirstWindow = 0.08F;
 constexpr int kMinMatches = 80;
-// Descriptors find a tenth of the corners again in any picture of the same kind: below this share chance
-// matches prevail.
-constexpr double kMinMatchShare = 0.2;
+// Descriptors find some corners again in any picture of the same kind: below this share of what the frame
+// next to the reference gave, chance matches prevail.
+constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
 constexpr std::size_t kHistoryFrames = 60;
 
@@ -31,6 +31,7 @@ void Initialiser::clear() {
 
 void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   reference_ = std::move(frame);
+  most_matches_ = 0;
   expected_px_.clear();
   for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
@@ -122,8 +123,8 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
   match(*frame, &pairs_);
   last_matches_ = static_cast<int>(pairs_.size());
   const auto age = frame->number - reference_->number;
-  const std::size_t fewer = std::min(reference_->set.features.size(), frame->set.features.size());
-  const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * static_cast<double>(fewer)));
+  most_matches_ = std::max(most_matches_, last_matches_);
+  const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * most_matches_));
   if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
     // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,
     // or there is none, this one.
@@ -133,6 +134,7 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
     set_reference(next != history_.end() && age > 1 ? *next : frame);
     match(*frame, &pairs_);
     last_matches_ = static_cast<int>(pairs_.size());
+    most_matches_ = last_matches_;
     if (last_matches_ < wanted) set_reference(frame);
     return {};
   }

@@ -39,6 +39,7 @@ class Initialiser {
   std::vector<Eigen::Vector2f> expected_px_;  // where each reference feature was seen last
   std::vector<Pairing> pairs_;
   int last_matches_ = 0;
+  int most_matches_ = 0;  // with the present reference
 };
 
 }  // namespace farpoint::slam

@@ -229,7 +229,7 @@ TEST_F(LandmarkMakerTest, SightingsAttachUntilTheDepthIsKnown) {
   EXPECT_EQ(counts_.vmp_attached, 1U);
   EXPECT_EQ(map_->landmarks()[h].state, LandmarkState::kBearing);
 
-  const KeyframeHandle d = look(8.0, {kFar});
+  const KeyframeHandle d = look(12.0, {kFar});
   maker_->process(d, {c});
   const Landmark* l = map_->landmarks().get(h);
   ASSERT_NE(l, nullptr);
@@ -239,7 +239,8 @@ TEST_F(LandmarkMakerTest, SightingsAttachUntilTheDepthIsKnown) {
   EXPECT_EQ(l->observations.size(), 4U);
   EXPECT_EQ(l->host, a);
   EXPECT_NEAR(l->inverse_depth * kFar.position.norm(), 1.0, 1e-3);
-  EXPECT_LT(l->inverse_depth_sigma, config_.landmarks.promote_relative_sigma * l->inverse_depth);
+  EXPECT_LT(l->inverse_depth_sigma, 0.1 * l->inverse_depth);
+  EXPECT_GT(l->inverse_depth_sigma, 0.0);
   EXPECT_EQ(counts_.vmp_promoted, 1U);
   EXPECT_EQ(counts_.landmarks_made, 1U);
   expect_balance();
