@@ -2,7 +2,7 @@
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-export HOME=${HOME:-/root}
+export HOME=${HOME:-$(getent passwd "$(id -u)" | cut -d: -f6)}
 caches=${XDG_CACHE_HOME:-$HOME/.cache}/farpoint
 export CCACHE_DIR=${CCACHE_DIR:-$caches/ccache}
 recordings=$(realpath -m "$root/../shared/data")

@@ -35,7 +35,7 @@ struct Scene {
   slam::SE3 T_body_camera;
   double rate_hz = 10;
   int frames = 300;
-  int features = 600;                   // corners a frame
+  int features = 1000;                  // corners a frame
   double focal_error = 0.0;             // the estimator believes in a focal length larger by this share
   Motion motion = Motion::kVehicle;
   double speed_m_s = 10;

@@ -123,7 +123,7 @@ void add(const RunReport& r, int mode, Row* row) {
   row->vmp[mode].push_back(100 * r.vmp_share());
   row->posed[mode].push_back(100.0 * r.posed_frames / r.frames);
   row->ms[mode].push_back(1e3 * r.seconds / r.frames);
-  const std::vector<double> z = normalised(r, true);
+  const std::vector<double> z = normalised(r, false);
   row->z[mode].insert(row->z[mode].end(), z.begin(), z.end());
 }
 

@@ -1,6 +1,7 @@
 #include "tests/simulator/simulator.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -17,6 +18,8 @@ constexpr float kAlignBorder_px = 6;     // level pixels
 constexpr float kMaxScaleChange = 2.2F;
 constexpr int kCell_px = 60;
 
+std::atomic<int> images_alive{0};
+
 static_assert(sizeof(PatchPayload) <= sizeof(slam::Patch::pixels));
 static_assert(offsetof(PatchPayload, point) == 0 && offsetof(PatchPayload, frame) == 4);
 
@@ -32,7 +35,12 @@ SimImage::SimImage(const Options& options, std::uint32_t frame, std::vector<Proj
   for (std::uint32_t i = 0; i < visible_.size(); ++i)
     if (visible_[i].group != 0) groups_.emplace_back(visible_[i].group, i);
   std::sort(groups_.begin(), groups_.end());
+  ++images_alive;
 }
+
+SimImage::~SimImage() { --images_alive; }
+
+int SimImage::alive() { return images_alive; }
 
 bool SimImage::extract_patch(const slam::FeatureSet& set, std::size_t index, slam::Patch* patch) const {
   if (index >= features_.size() || index >= set.features.size()) return false;

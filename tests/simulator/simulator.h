@@ -40,6 +40,11 @@ class SimImage final : public slam::FrameImage {
 
   SimImage(const Options& options, std::uint32_t frame, std::vector<Projection> visible,
            std::vector<PatchPayload> features);
+  ~SimImage() override;
+  SimImage(const SimImage&) = delete;
+  SimImage& operator=(const SimImage&) = delete;
+  // Images somebody still holds.
+  [[nodiscard]] static int alive();
   [[nodiscard]] bool extract_patch(const slam::FeatureSet& set, std::size_t index, slam::Patch* patch) const override;
   // True projection + A * (host corner's offset from its true projection) + noise. Not ok where the point is hidden, out
   // of reach, too much larger or smaller than in the host, or, now and then, for no reason.
