@@ -136,6 +136,8 @@ std::vector<ConfigKey> make_keys() {
              FIELD(estimator.landmarks.promote_parallax_rad)),
       number("landmarks.promote_relative_sigma", "", 0.001, 1,
              FIELD(estimator.landmarks.promote_relative_sigma)),
+      integer("landmarks.bearing_observations", "keyframes", 3, 1000000,
+              FIELD(estimator.landmarks.bearing_observations)),
       integer("landmarks.max_bearing", "landmarks", 0, 5000000, FIELD(estimator.landmarks.max_bearing)),
 
       integer("mapping.neighbours", "keyframes", 1, 1000, FIELD(estimator.mapping.neighbours)),

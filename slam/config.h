@@ -40,7 +40,7 @@ struct CapacityConfig {
 struct InitialisationConfig {
   double min_parallax_rad = 0.0175;  // a quarter of the points must show it: one degree
   int min_landmarks = 80;            // good points two views must give
-  double max_frames = 30;            // reference is renewed after so many frames
+  double max_frames = 60;            // reference is renewed after so many frames
 };
 
 struct TrackingConfig {
@@ -63,6 +63,7 @@ struct LandmarkConfig {
   LandmarkMode mode = LandmarkMode::kVmp;
   double promote_parallax_rad = 0.020;   // largest parallax: acos(0.9998), as in the paper
   double promote_relative_sigma = 0.05;  // vmp: sigma(inverse depth) / inverse depth
+  int bearing_observations = 3;          // vmp: sightings from which a virtual point takes part in poses
   int max_bearing = 4000;                // candidates alive at once
 };
 

@@ -374,6 +374,7 @@ struct Estimator::Impl {
     counts.vmp_rejected = m.vmp_rejected;
     counts.vmp_evicted = m.vmp_evicted;
     counts.local_ba = m.local_ba;
+    counts.vmps = m.vmp_alive;
     counts.keyframes = static_cast<std::uint32_t>(mapper.map().keyframes().size());
     counts.landmarks = static_cast<std::uint32_t>(mapper.map().landmarks().size());
   }

@@ -219,6 +219,12 @@ void LandmarkMaker::attach(LandmarkHandle handle, KeyframeHandle keyframe, std::
   try_promote(handle, true);
 }
 
+void LandmarkMaker::reconsider(LandmarkHandle handle) {
+  if (map_.landmarks()[handle].state != LandmarkState::kBearing) return;
+  ++counts_.vmp_attached;
+  try_promote(handle, true);
+}
+
 void LandmarkMaker::merge(LandmarkHandle into, LandmarkHandle from) {
   // Consistent when the patch of the one is found where the other was seen, in each of its keyframes.
   const Landmark source = map_.landmarks()[from];

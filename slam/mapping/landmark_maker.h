@@ -18,6 +18,8 @@ class LandmarkMaker {
   // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes
   // landmarks.
   void process(KeyframeHandle keyframe, const std::vector<KeyframeHandle>& neighbours);
+  // A VMP that tracking has seen once more: promotes it where that was what it lacked.
+  void reconsider(LandmarkHandle landmark);
   // Gives back the slots of VMPs not seen for a while, and of the least useful ones beyond the limit.
   void evict_bearings(KeyframeHandle newest);
 

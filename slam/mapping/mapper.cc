@@ -114,7 +114,8 @@ std::vector<KeyframeHandle> Mapper::neighbours(KeyframeHandle keyframe, std::siz
 void Mapper::attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request) {
   for (const Sighting& s : request.sightings) {
     if (!map_.landmarks().contains(s.landmark)) continue;
-    map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px});
+    if (map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px}))
+      maker_.reconsider(s.landmark);
   }
   for (const SightingCount& c : request.counts)
     if (Landmark* l = map_.landmarks().get(c.landmark)) l->visible += c.visible, l->found += c.found;
@@ -166,6 +167,7 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
     }
   }
   map_.update_covisibility(keyframe);
+  count_virtual_points();
   return make_view(keyframe);
 }
 
@@ -179,7 +181,15 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   cull_keyframes(newest_);
   limit_memory(newest_);
   map_.update_covisibility(newest_);
+  count_virtual_points();
   return make_view(newest_);
+}
+
+void Mapper::count_virtual_points() {
+  counts_.vmp_alive = 0;
+  map_.landmarks().for_each([this](LandmarkHandle, const Landmark& l) {
+    counts_.vmp_alive += l.state == LandmarkState::kBearing ? 1U : 0U;
+  });
 }
 
 // ----------------------------------------------------------------------------------------------------
@@ -269,6 +279,16 @@ void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
 // ------------------------------------------------------------------------------------------------------
 // local BA
 
+bool Mapper::holds_pose(const Landmark& landmark) const {
+  // A virtual point's inverse depth is known within its sigma, and that is how BA (free, at least 0) and
+  // tracking (the residual's covariance) take it: across its epipolar line it says as much about rotation as
+  // a point does. (ours; the paper uses virtual points once they are points.) Two sightings agree with any
+  // mismatch along the line.
+  if (landmark.state != LandmarkState::kBearing) return true;
+  return landmark.failures == 0 &&
+         static_cast<int>(landmark.observations.size()) >= config_.landmarks.bearing_observations;
+}
+
 void Mapper::select_window(KeyframeHandle centre) {
   window_.assign(1, centre);
   const auto limit = static_cast<std::size_t>(config_.mapping.window_keyframes);
@@ -293,7 +313,7 @@ void Mapper::build_problem() {
   for (const KeyframeHandle& h : window_)
     for (const LandmarkHandle& lh : map_.keyframes()[h].landmarks) {
       const Landmark* l = map_.landmarks().get(lh);
-      if (l == nullptr || l->state == LandmarkState::kBearing || taken[lh.index] != 0) continue;
+      if (l == nullptr || !holds_pose(*l) || taken[lh.index] != 0) continue;
       if (problem_landmarks_.size() >= static_cast<std::size_t>(config_.mapping.window_landmarks)) break;
       taken[lh.index] = 1;
       problem_landmarks_.push_back(lh);
@@ -538,7 +558,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
     view->keyframes.push_back({k.id, k.T_world_body});
     for (const LandmarkHandle& lh : k.landmarks) {
       const Landmark* l = map_.landmarks().get(lh);
-      if (l == nullptr || l->state == LandmarkState::kBearing || taken[lh.index] != 0) continue;
+      if (l == nullptr || !holds_pose(*l) || taken[lh.index] != 0) continue;
       taken[lh.index] = 1;
       ViewLandmark v;
       v.handle = lh;
@@ -551,7 +571,8 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       v.patch = l->patch;
       v.host_level = l->host_level;
       v.in_reference = h == reference;
-      v.confirmed = l->state == LandmarkState::kFull || l->observations.size() > 2;
+      v.confirmed = l->state == LandmarkState::kFull ||
+                    (l->state == LandmarkState::kWeak && l->observations.size() > 2);
       if (v.in_reference) {
         if (v.confirmed) ++view->reference_landmarks;
         const double d =

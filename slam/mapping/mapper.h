@@ -42,12 +42,15 @@ class Mapper {
   KeyframeHandle make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);
   void attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request);
   void cull_recent_landmarks();
+  void count_virtual_points();
   [[nodiscard]] std::vector<KeyframeHandle> neighbours(KeyframeHandle keyframe, std::size_t limit) const;
 
   // Duplicates: landmarks of the one keyframe searched in the other.
   void fuse_neighbourhood(KeyframeHandle keyframe);
   void search_neighbours_landmarks(KeyframeHandle keyframe);
   void fuse(LandmarkHandle into, LandmarkHandle from);
+  // Whether its sightings take part in poses: in BA and in the view that tracking gets.
+  [[nodiscard]] bool holds_pose(const Landmark& landmark) const;
   void search_into(KeyframeHandle keyframe, const std::vector<LandmarkHandle>& landmarks);
 
   void optimise(KeyframeHandle centre, int iterations);

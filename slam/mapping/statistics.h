@@ -11,6 +11,7 @@ struct MappingCounts {
   std::uint64_t vmp_made = 0, vmp_attached = 0, vmp_merged = 0, vmp_promoted = 0, vmp_rejected = 0,
                 vmp_evicted = 0;
   std::uint64_t local_ba = 0;
+  std::uint32_t vmp_alive = 0;
 };
 
 }  // namespace farpoint::slam

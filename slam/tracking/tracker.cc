@@ -240,7 +240,7 @@ double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_bo
   std::vector<double> motions;
   motions.reserve(matches_.size());
   for (const Match& m : matches_) {
-    if (!m.inlier) continue;
+    if (!m.inlier || !view_->landmarks[m.view_index].confirmed) continue;
     const Eigen::Vector4d& p = view_->landmarks[m.view_index].point_w;
     const Eigen::Vector3d now = p.head<3>() - p[3] * centre, then = p.head<3>() - p[3] * reference;
     motions.push_back(std::atan2(now.cross(then).norm(), now.dot(then)) * camera.camera.focal_px());

@@ -168,6 +168,7 @@ Scene make_scene(const std::string& name) {
     Scene s = drone(name);
     s.motion = Motion::kHoverThenFly;
     s.frames = 300;
+    s.still_frames = 120;
     return s;
   }
   if (name == "rotating") {

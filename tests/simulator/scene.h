@@ -38,6 +38,7 @@ struct Scene {
   int features = 1000;                  // corners a frame
   double focal_error = 0.0;             // the estimator believes in a focal length larger by this share
   Motion motion = Motion::kVehicle;
+  int still_frames = 0;                 // at the start, without any translation: no monocular map can pose them
   double speed_m_s = 10;
   std::vector<Path::Segment> path;
   Path::Beyond beyond = Path::Beyond::kStraight;

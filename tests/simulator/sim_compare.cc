@@ -127,7 +127,7 @@ void add(const RunReport& r, int mode, Row* row) {
   row->z[mode].insert(row->z[mode].end(), z.begin(), z.end());
 }
 
-// Compared only where both have most of the drive in one map.
+// Compared only where both have most of the drive, from where it moves, in one map.
 constexpr double kEnoughPosed = 0.9;
 
 slam::EstimatorConfig configuration(const Options& o, const Scene& scene, slam::LandmarkMode mode) {
@@ -144,7 +144,7 @@ Row compare(const Options& o, const Scene& scene) {
     const RunReport vmp = run_scene(scene, seed, configuration(o, scene, slam::LandmarkMode::kVmp));
     if (o.verbose) print_run("baseline", seed, baseline), print_run("vmp", seed, vmp);
     add(baseline, 0, &row), add(vmp, 1, &row);
-    const double enough = kEnoughPosed * scene.frames;
+    const double enough = kEnoughPosed * (scene.frames - scene.still_frames);
     if (!baseline.aligned || !vmp.aligned || baseline.posed_frames < enough || vmp.posed_frames < enough) {
       ++row.failed;
       continue;

@@ -57,6 +57,43 @@ std::string name_of(const testing::TestParamInfo<Damage>& info) {
   return info.param.name;
 }
 
+// ---- parts ----
+
+TEST(ImportPart, KeepsTheFramesAskedForAndTheTruthAroundThem) {
+  const ScratchFolder root;
+  make_kitti(root.path());
+  const Recording whole = read_kitti(root.path(), "07");
+  Recording part = whole;
+  keep_part(1, 2, "07", &part);
+  ASSERT_EQ(part.images.size(), 4U);  // two instants of two cameras
+  EXPECT_EQ(part.images.front().utime, whole.images[2].utime);
+  EXPECT_EQ(part.images.front().sequence, 1);  // numbered as in the whole recording
+  EXPECT_EQ(part.images.back().utime, whole.images[5].utime);
+  EXPECT_EQ(part.truth.size(), whole.truth.size()) << "0.5 s of truth stay on either side";
+
+  Recording rest = whole;
+  keep_part(3, 0, "07", &rest);
+  EXPECT_EQ(rest.images.size(), 4U);
+  Recording beyond = whole;
+  keep_part(4, 100, "07", &beyond);
+  EXPECT_EQ(beyond.images.size(), 2U);
+}
+
+TEST(ImportPart, SaysWhatAPartMayBe) {
+  const ScratchFolder root;
+  make_kitti(root.path());
+  Recording recording = read_kitti(root.path(), "07");
+  for (const auto& [first, frames] : {std::pair{5, 0}, {-1, 0}, {0, -2}}) {
+    expect_all_in(
+        complaint_of([&, first = first, frames = frames] { keep_part(first, frames, "07", &recording); }),
+        {"07", "--first", "5 frames, 0 to 4"});
+  }
+  const ProgramResult r = run_farpoint_program("import kitti '" + root.path().string() +
+                                               "' 07 --first 9 -o '" + (root / "x.lcm").string() + "'");
+  EXPECT_EQ(r.status, 2);
+  EXPECT_FALSE(fs::exists(root / "x.lcm"));
+}
+
 // ---- KITTI ----
 
 TEST(ImportKitti, ReadsStereoTimesAndPoses) {

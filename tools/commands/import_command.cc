@@ -14,6 +14,7 @@ namespace {
 
 struct ImportOptions {
   std::string folder, sequence, camera_file, output;
+  std::int64_t first = 0, frames = 0;
 };
 
 void print_summary(const Recording& recording, const std::string& output) {
@@ -25,9 +26,11 @@ void print_summary(const Recording& recording, const std::string& output) {
               recording.truth.size(), recording.truth_has_orientation ? "poses" : "positions");
 }
 
-int write_and_report(const Recording& recording, const std::string& output) {
-  write_recording(recording, output);
-  print_summary(recording, output);
+int write_and_report(Recording recording, const ImportOptions& options) {
+  if (options.first != 0 || options.frames != 0)
+    keep_part(options.first, options.frames, options.folder, &recording);
+  write_recording(recording, options.output);
+  print_summary(recording, options.output);
   return kExitDone;
 }
 
@@ -36,6 +39,9 @@ CLI::App* add_layout(CLI::App* import, const char* name, const char* description
   layout->add_option("DIR", options->folder, "Folder of the recording")->required();
   layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
       ->required();
+  layout->add_option("--first", options->first, "Start at this frame, counted from 0")->capture_default_str();
+  layout->add_option("--frames", options->frames, "Take so many frames; 0: all that follow")
+      ->capture_default_str();
   return layout;
 }
 
@@ -64,9 +70,7 @@ void add_import_command(CLI::App* app, Action* action) {
       "from\n"
       "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').");
   kitti->callback([=] {
-    *action = [=] {
-      return write_and_report(read_kitti(options->folder, options->sequence), options->output);
-    };
+    *action = [=] { return write_and_report(read_kitti(options->folder, options->sequence), *options); };
   });
 
   CLI::App* euroc = add_layout(import, "euroc", "EuRoC (ASL): DIR holds mav0, or is it", options.get());
@@ -74,15 +78,14 @@ void add_import_command(CLI::App* app, Action* action) {
       "Reads cam0, cam1 and imu0 where there are any, and state_groundtruth_estimate0. Images missing on one "
       "side are\n"
       "counted and left out.");
-  euroc->callback(
-      [=] { *action = [=] { return write_and_report(read_euroc(options->folder), options->output); }; });
+  euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder), *options); }; });
 
   CLI::App* tum = add_layout(import, "tum", "TUM RGB-D: DIR holds rgb.txt", options.get());
   tum->add_option("--camera", options->camera_file, "Camera file, as in config/cameras")->required();
   tum->footer("Reads rgb.txt and groundtruth.txt where there is one. Depth is not read.");
   tum->callback([=] {
     *action = [=] {
-      return write_and_report(read_tum_rgbd(options->folder, options->camera_file), options->output);
+      return write_and_report(read_tum_rgbd(options->folder, options->camera_file), *options);
     };
   });
 }

@@ -61,4 +61,28 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
   }
 }
 
+void keep_part(std::int64_t first, std::int64_t frames, const std::string& recording_name,
+               Recording* recording) {
+  std::vector<std::int64_t> instants;
+  for (const RecordingImage& image : recording->images)
+    if (instants.empty() || image.utime != instants.back()) instants.push_back(image.utime);
+  const auto count = static_cast<std::int64_t>(instants.size());
+  if (first < 0 || first >= count || frames < 0) {
+    throw InputError(recording_name + ": --first " + std::to_string(first) + " --frames " +
+                     std::to_string(frames) + ": expected a part of its " + std::to_string(count) +
+                     " frames, 0 to " + std::to_string(count - 1));
+  }
+  const std::int64_t last = frames == 0 ? count - 1 : std::min(first + frames, count) - 1;
+  const std::int64_t from = instants[static_cast<std::size_t>(first)],
+                     to = instants[static_cast<std::size_t>(last)];
+  // So that truth can be interpolated at the first and last image.
+  constexpr std::int64_t kMargin_us = 500'000;
+  std::erase_if(recording->images, [=](const RecordingImage& i) { return i.utime < from || i.utime > to; });
+  const auto outside = [=](const auto& sample) {
+    return sample.utime < from - kMargin_us || sample.utime > to + kMargin_us;
+  };
+  std::erase_if(recording->imu, outside);
+  std::erase_if(recording->truth, outside);
+}
+
 }  // namespace farpoint::tools

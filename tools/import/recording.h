@@ -71,4 +71,10 @@ struct Recording {
 // the file to blame.
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording);
 
+// Keeps `frames` instants of the images (0: all that follow) from the one numbered `first` on, and the IMU
+// samples and truth of their time, half a second more on either side. Throws InputError naming
+// `recording_name` where there is no such instant.
+void keep_part(std::int64_t first, std::int64_t frames, const std::string& recording_name,
+               Recording* recording);
+
 }  // namespace farpoint::tools
