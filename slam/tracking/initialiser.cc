@@ -90,12 +90,13 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
   }
   const TwoViewResult r = estimate_two_view(first, second, kCornerSigma_px / camera.camera.focal_px());
   if (r.status != TwoViewStatus::kOk) return {};
-  // A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough.
+  // A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough,
+  // and in a sparse scene half of those that a map must have.
   const auto wide = std::count_if(r.parallax_rad.begin(), r.parallax_rad.end(), [&](const double& p) {
     return p > config_.initialisation.min_parallax_rad &&
            r.inlier[static_cast<std::size_t>(&p - r.parallax_rad.data())] != 0;
   });
-  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks,
+  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks / 2,
                                       static_cast<std::ptrdiff_t>(r.inliers / 4)))
     return {};
   InitialPair pair;
