@@ -321,7 +321,7 @@ TEST(Kernels, BandSelectionIsIdenticalAndRight) {
   }
   const PointArrays points{u.data(), v.data(), angle.data(), level.data()};
   std::size_t selected = 0;
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < 800; ++trial) {
     Band band;
     const float direction = uniform(rng, -3.1415F, 3.1415F);
     band.u_px = uniform(rng, 0, 200);
