@@ -22,11 +22,6 @@ bool due(std::int64_t utime, double rate_hz, std::int64_t* next_utime) {
   return true;
 }
 
-// The frame was tracked against a map that had been there before it.
-bool is_followed(const slam::FrameResult& result) {
-  return result.view_sequence > 0 && result.state != slam::State::kInitialising;
-}
-
 std::size_t sum_bytes(const std::vector<std::pair<std::string, std::size_t>>& table) {
   std::size_t sum = 0;
   for (const auto& [name, bytes] : table) sum += bytes;
@@ -70,11 +65,11 @@ const FrameOutput& Session::process(const slam::FrameInput& input, const InputCo
                                     const OutputCounts& out, StageClock* clock) {
   {
     const StageScope scope(clock, timing_t::STAGE_FRAME);
+    estimator_.listen(clock);
     frame_ = make_frame_output(estimator_.process(input), config_.scale.assumed);
+    estimator_.listen(nullptr);
   }
-  // Without a keyframe no mapping ran: the whole frame was tracking. With one its share is not known here.
-  if (is_followed(frame_.result) && !frame_.result.keyframe)
-    clock->copy(timing_t::STAGE_FRAME, timing_t::STAGE_TRACKING);
+  if (!frame_.result.followed()) clock->forget(timing_t::STAGE_TRACKING);
   ++end_.frames;
   end_.utime = input.utime;
   end_.last = frame_.result;

@@ -21,6 +21,39 @@ void add_ms(double began_s, double now_s, double* total_ms) {
   *total_ms = std::max(*total_ms, 0.0) + 1e3 * (now_s - began_s);
 }
 
+// The name of the estimator's stage in timing_t.
+int message_stage(slam::Stage stage) {
+  switch (stage) {
+    case slam::Stage::kTracking:
+      return timing_t::STAGE_TRACKING;
+    case slam::Stage::kPyramid:
+      return timing_t::STAGE_PYRAMID;
+    case slam::Stage::kExtraction:
+      return timing_t::STAGE_EXTRACTION;
+    case slam::Stage::kMatching:
+      return timing_t::STAGE_MATCHING;
+    case slam::Stage::kAlignment:
+      return timing_t::STAGE_ALIGNMENT;
+    case slam::Stage::kPose:
+      return timing_t::STAGE_POSE;
+    case slam::Stage::kKeyframe:
+      return timing_t::STAGE_KEYFRAME;
+    case slam::Stage::kMapping:
+      return timing_t::STAGE_MAPPING;
+    case slam::Stage::kTriangulation:
+      return timing_t::STAGE_TRIANGULATION;
+    case slam::Stage::kFusing:
+      return timing_t::STAGE_FUSING;
+    case slam::Stage::kLocalBa:
+      return timing_t::STAGE_LOCAL_BA;
+    case slam::Stage::kCalibration:
+      return StageClock::kCalibration;
+    case slam::Stage::kCulling:
+      return timing_t::STAGE_CULLING;
+  }
+  return timing_t::STAGE_FRAME;
+}
+
 }  // namespace
 
 double thread_cpu_s() {
@@ -64,9 +97,16 @@ void StageClock::end(int stage) {
   add_ms(wall_began_s_.at(i), steady_s(), &wall_ms_.at(i));
 }
 
-void StageClock::copy(int same_as, int stage) {
-  cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms(same_as);
-  wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms(same_as);
+void StageClock::begin(slam::Stage stage) {
+  begin(message_stage(stage));
+}
+void StageClock::end(slam::Stage stage) {
+  end(message_stage(stage));
+}
+
+void StageClock::forget(int stage) {
+  cpu_ms_.at(static_cast<std::size_t>(stage)) = -1.0;
+  wall_ms_.at(static_cast<std::size_t>(stage)) = -1.0;
 }
 
 timing_t StageClock::message(std::int64_t utime, std::int64_t sequence) const {

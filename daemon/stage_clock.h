@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ipc/message.h"
+#include "slam/stages.h"
 
 namespace farpoint::daemon {
 
@@ -20,18 +21,24 @@ namespace farpoint::daemon {
 [[nodiscard]] std::int64_t resident_bytes();
 [[nodiscard]] std::int64_t peak_resident_bytes();
 
-// Adds up what each stage of one frame took. A stage may run several times; stages may nest.
-class StageClock {
+// Adds up what each stage of one frame took. A stage may run several times; stages may nest. Listens to an
+// estimator's stages.
+class StageClock final : public slam::StageListener {
  public:
   static constexpr int kStages = timing_t::STAGES;
+  // Mapping: the camera's calibration refined from the map. Behind the stages that timing_t names.
+  static constexpr int kCalibration = timing_t::STAGE_FRAME + 1;
+  static_assert(kCalibration < kStages);
 
   StageClock() { new_frame(); }
   void new_frame();
   // `stage` is one of timing_t::STAGE_*.
   void begin(int stage);
   void end(int stage);
-  // `stage` took what `same_as` took.
-  void copy(int same_as, int stage);
+  void begin(slam::Stage stage) override;
+  void end(slam::Stage stage) override;
+  // `stage` counts as not having run.
+  void forget(int stage);
 
   // Negative where the stage did not run in this frame.
   [[nodiscard]] double cpu_ms(int stage) const { return cpu_ms_.at(static_cast<std::size_t>(stage)); }

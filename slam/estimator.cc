@@ -153,6 +153,7 @@ struct Estimator::Impl {
   SE3 T_map_body_last;
   bool has_last = false;
   std::uint32_t resets = 0;
+  StageListener* listener = nullptr;
 
   std::shared_ptr<Frame> new_frame(std::int64_t utime, std::int64_t sequence, int camera_index) {
     auto frame = std::make_shared<Frame>();
@@ -222,7 +223,12 @@ struct Estimator::Impl {
     const std::optional<InitialPair> pair = initialiser.add(frame);
     result.matches = initialiser.last_matches();
     if (!pair) return;
-    const auto view = mapper.start_map(*pair, map_id + 1);
+    std::shared_ptr<const LocalView> view;
+    {
+      const StagePause pause(listener, Stage::kTracking);
+      const StageSpan mapping(listener, Stage::kMapping);
+      view = mapper.start_map(*pair, map_id + 1);
+    }
     if (!view) return;
     ++map_id;
     ++counts.maps;
@@ -294,6 +300,7 @@ struct Estimator::Impl {
   }
 
   void maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
+    const StageSpan span(listener, Stage::kKeyframe);
     const KeyframeSituation situation{frames_since_keyframe, mapping_busy_until <= frame->number};
     if (!wants_keyframe(config, *tracker.view(), outcome, situation)) return;
     KeyframeRequest request;
@@ -304,6 +311,9 @@ struct Estimator::Impl {
     tracker.sightings(&request.sightings);
     tracker.take_counts(&request.counts);
     const std::uint64_t start = std::max(frame->number, mapping_busy_until);
+    // Lockstep: mapping's work, done here and now, is no work of tracking's.
+    const StagePause pause_keyframe(listener, Stage::kKeyframe), pause_tracking(listener, Stage::kTracking);
+    const StageSpan mapping(listener, Stage::kMapping);
     auto quick = mapper.insert(request);
     if (!quick) return;
     pending.push_back(
@@ -394,10 +404,17 @@ const FrameResult& Estimator::process(const FrameInput& input) {
     return s.result;
   }
   if (!s.acceptable(input.utime, input.camera)) return s.result;
+  const StageSpan tracking(s.listener, Stage::kTracking);
   const std::shared_ptr<Frame> frame = s.new_frame(input.utime, input.sequence, input.camera);
   const std::shared_ptr<PyramidFrame> pixels = s.pyramids.take();
-  pixels->pyramid.build(input.image);
-  s.extractor.extract(pixels->pyramid, {}, &frame->set);
+  {
+    const StageSpan span(s.listener, Stage::kPyramid);
+    pixels->pyramid.build(input.image);
+  }
+  {
+    const StageSpan span(s.listener, Stage::kExtraction);
+    s.extractor.extract(pixels->pyramid, {}, &frame->set);
+  }
   frame->image = pixels;
   s.index_features(frame.get());
   return s.step(frame);
@@ -411,6 +428,12 @@ const FrameResult& Estimator::process(FeatureInput&& input) {
   frame->image = std::move(input.image);
   s.index_features(frame.get());
   return s.step(frame);
+}
+
+void Estimator::listen(StageListener* listener) {
+  impl_->listener = listener;
+  impl_->tracker.listen(listener);
+  impl_->mapper.listen(listener);
 }
 
 void Estimator::finish() {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/stages.h"
 
 namespace farpoint::slam {
 
@@ -68,6 +69,9 @@ struct FrameResult {
   std::uint64_t view_sequence = 0;  // local-map view this frame was tracked against
   int features = 0, matches = 0, inliers = 0, aligned = 0;
   bool keyframe = false;
+
+  // Tracked against a map that had been there before the frame: what tracking's times are about.
+  [[nodiscard]] bool followed() const { return view_sequence > 0 && state != State::kInitialising; }
 };
 
 // Counts over the whole run and of the present map.
@@ -124,6 +128,9 @@ class Estimator {
   // counts().frames_rejected; the result then repeats the last state without a pose.
   const FrameResult& process(const FrameInput& input);
   const FrameResult& process(FeatureInput&& input);
+
+  // Announces the stages of every later frame; null: to nobody. The listener must outlive its use.
+  void listen(StageListener* listener);
 
   // Finishes what mapping had queued; no extra optimisation.
   void finish();

@@ -122,6 +122,11 @@ bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vecto
   const double r = solve_rising([&](double x) { return x * radial_factor(d, x * x); },
                                 [&](double x) { return radial_slope(d, x * x); }, rd, max_radius);
   *m = rd > 0.0 ? Eigen::Vector2d(distorted * (r / rd)) : Eigen::Vector2d(0.0, 0.0);
+  if (d[2] == 0.0 && d[3] == 0.0) {
+    // Nothing but radial: solved, unless rd lies beyond what the disc's edge maps to.
+    const double left = r * radial_factor(d, r * r) - rd;
+    return std::abs(left) <= 1e-12 * (1.0 + rd);
+  }
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector2d residual = radtan_distort(d, *m) - distorted;
     const Eigen::Matrix2d j = radtan_derivative(d, *m);

@@ -12,13 +12,15 @@
 #include <cmath>
 #include <cstring>
 
+#include "slam/image/kernels.h"
 #include "slam/image/pyramid.h"
 
 namespace farpoint::slam {
 namespace {
 
-constexpr int kSide = 8;  // template side, target level pixels
-constexpr int kCount = kSide * kSide;
+constexpr int kSide = kTemplateSide;  // target level pixels
+constexpr int kCount = kTemplateCount;
+static_assert(Patch::kSize == kAlignPatchSide);
 constexpr float kFirst = -(kSide - 1) / 2.0F;  // offset of the first template pixel from its centre
 constexpr int kMaxIterations = 10;
 constexpr float kConverged = 0.02F;  // level pixels; what is left after such a step is a fraction of it
@@ -58,70 +60,21 @@ float sum(Float4 v) {
 }
 
 // The quadratic B-spline: weights of the pixels nearest - 1, nearest, nearest + 1 at offset t from the
-// nearest, |t| <= 0.5, and their derivatives. The fourth weight is 0.
+// nearest, |t| <= 0.5. The fourth weight is 0.
 constexpr Float4 kSpline[3] = {{0.125F, 0.75F, 0.125F, 0}, {-0.5F, 0, 0.5F, 0}, {0.5F, -1, 0.5F, 0}};
 Float4 spline(float t) {
   return kSpline[0] + t * (kSpline[1] + t * kSpline[2]);
-}
-Float4 spline_slope(float t) {
-  return kSpline[1] + (2 * t) * kSpline[2];
 }
 
 int nearest_pixel(float x) {
   return static_cast<int>(std::floor(x + 0.5F));
 }
 
-using Window = std::array<float, kCount>;
-// With room for a Float4 at the last pixel.
-using SmoothPatch = std::array<float, Patch::kSize * Patch::kSize + 4>;
-
-// The warped host patch: values and derivatives by the target level's pixel.
-struct Template {
-  Window value, dx, dy;
-};
-
-// The patch after [1 2 1]/4 along both axes; pixels outside count as their neighbour inside.
-void smooth_patch(const Patch& patch, SmoothPatch* out) {
-  constexpr int kSize = Patch::kSize;
-  float rows[kSize + 2][kSize];
-  for (int y = 0; y < kSize; ++y) {
-    const std::uint8_t* p = patch.pixels.data() + y * kSize;
-    const auto smooth = [p](int left, int x, int right) {
-      return kBlurSide * static_cast<float>(p[left] + p[right]) + kBlurCentre * static_cast<float>(p[x]);
-    };
-    rows[y + 1][0] = smooth(0, 0, 1);
-    for (int x = 1; x < kSize - 1; ++x) rows[y + 1][x] = smooth(x - 1, x, x + 1);
-    rows[y + 1][kSize - 1] = smooth(kSize - 2, kSize - 1, kSize - 1);
-  }
-  std::copy_n(rows[1], kSize, rows[0]);
-  std::copy_n(rows[kSize], kSize, rows[kSize + 1]);
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
-      (*out)[static_cast<std::size_t>(y * kSize + x)] =
-          kBlurSide * (rows[y][x] + rows[y + 2][x]) + kBlurCentre * rows[y + 1][x];
-    }
-  }
-}
-
-// Adds value and gradient of the patch at host pixel (x, y), which the caller has checked.
-void sample_patch(const SmoothPatch& patch, float x, float y, float* value, float* slope_x, float* slope_y) {
-  // Positions are positive: truncation is the floor.
-  const int ix = static_cast<int>(x + 0.5F), iy = static_cast<int>(y + 0.5F);
-  const float tx = x - static_cast<float>(ix), ty = y - static_cast<float>(iy);
-  const Float4 wy = spline(ty), dy = spline_slope(ty);
-  const float* row = patch.data() + (iy - 1) * Patch::kSize + ix - 1;
-  const Float4 row0 = load4(row), row1 = load4(row + Patch::kSize), row2 = load4(row + 2 * Patch::kSize);
-  const Float4 across = wy[0] * row0 + wy[1] * row1 + wy[2] * row2;
-  const Float4 down = dy[0] * row0 + dy[1] * row1 + dy[2] * row2;
-  const Float4 wx = spline(tx);
-  *value += sum(wx * across);
-  *slope_x += sum(spline_slope(tx) * across);
-  *slope_y += sum(wx * down);
-}
+using SmoothPatch = std::array<float, Patch::kSize * Patch::kSize>;
 
 // `B` maps an offset in target level pixels to one in host level pixels. False if the template leaves the
 // patch.
-bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
+bool warp_template(const Kernels& kernels, const Patch& patch, const Eigen::Matrix2f& B, PatchTemplate* t) {
   // The norm of an isotropic warp is sqrt(2) times its scale.
   const bool fine = B.norm() > kSupersampleScale * std::sqrt(2.0F);
   const float sub = fine ? 0.25F : 0.0F;
@@ -129,24 +82,16 @@ bool warp_template(const Patch& patch, const Eigen::Matrix2f& B, Template* t) {
   // The spline reads one pixel around the nearest: positions 0.5 .. 14.5 are inside, the corner is at 8.
   constexpr float kReach = Patch::kSize - 1.5F - Patch::kCentre;
   if (!((B.cwiseAbs() * Eigen::Vector2f(reach, reach)).maxCoeff() < kReach)) return false;
-  SmoothPatch smooth;
-  constexpr float kCentre = Patch::kCentre;
-  smooth_patch(patch, &smooth);
+  alignas(64) SmoothPatch smooth;
+  kernels.smooth_patch(patch.pixels.data(), smooth.data());
+  *t = {};
   const int samples = fine ? 4 : 1;
-  const float share = 1.0F / static_cast<float>(samples);
-  const float bxx = B(0, 0), bxy = B(0, 1), byx = B(1, 0), byy = B(1, 1);
-  for (int i = 0; i < kCount; ++i) {
-    const float dx = kFirst + static_cast<float>(i % kSide), dy = kFirst + static_cast<float>(i / kSide);
-    float value = 0, slope_x = 0, slope_y = 0;
-    for (int s = 0; s < samples; ++s) {
-      const float sx = dx + ((s & 1) != 0 ? sub : -sub), sy = dy + ((s & 2) != 0 ? sub : -sub);
-      sample_patch(smooth, kCentre + bxx * sx + bxy * sy, kCentre + byx * sx + byy * sy, &value, &slope_x,
-                   &slope_y);
-    }
-    const auto index = static_cast<std::size_t>(i);
-    t->value[index] = value * share;
-    t->dx[index] = (bxx * slope_x + byx * slope_y) * share;
-    t->dy[index] = (bxy * slope_x + byy * slope_y) * share;
+  for (int s = 0; s < samples; ++s) {
+    const Eigen::Vector2f first(kFirst + ((s & 1) != 0 ? sub : -sub), kFirst + ((s & 2) != 0 ? sub : -sub));
+    const Eigen::Vector2f at = Eigen::Vector2f::Constant(Patch::kCentre) + B * first;
+    kernels.sample_patch(
+        smooth.data(),
+        {at.x(), B(0, 0), B(0, 1), at.y(), B(1, 0), B(1, 1), 1.0F / static_cast<float>(samples)}, t);
   }
   return true;
 }
@@ -161,9 +106,9 @@ void smooth_weights(float t, float out[5]) {
   out[4] = kBlurSide * w[2];
 }
 
-// The image around (x, y), at the offsets of the template. False if it leaves the image.
-bool sample_window(const ImageView& image, float x, float y, Window* out) {
-  constexpr int kRows = kSide + 4;
+// Sums of the image around (x, y), at the offsets of the template. False if it leaves the image.
+bool sample_window(const Kernels& kernels, const ImageView& image, float x, float y,
+                   const PatchTemplate& with, WindowSums* out) {
   const float x0 = x + kFirst, y0 = y + kFirst;
   // Written so that NaN fails.
   if (!(x0 >= 1.5F && y0 >= 1.5F && x0 + kSide < static_cast<float>(image.width_px) - 1.5F &&
@@ -174,92 +119,52 @@ bool sample_window(const ImageView& image, float x, float y, Window* out) {
   float wx[5], wy[5];
   smooth_weights(x0 - static_cast<float>(ix), wx);
   smooth_weights(y0 - static_cast<float>(iy), wy);
-  // Two halves of four columns each.
-  Float4 rows[kRows][2];
-  for (int r = 0; r < kRows; ++r) {
-    const std::uint8_t* p =
-        image.data + static_cast<std::ptrdiff_t>(iy - 2 + r) * image.stride_bytes + ix - 2;
-    float pixels[kRows];
-    for (int c = 0; c < kRows; ++c) pixels[c] = static_cast<float>(p[c]);
-    for (int half = 0; half < 2; ++half) {
-      const float* q = pixels + 4 * half;
-      rows[r][half] = wx[0] * load4(q) + wx[1] * load4(q + 1) + wx[2] * load4(q + 2) + wx[3] * load4(q + 3) +
-                      wx[4] * load4(q + 4);
-    }
-  }
-  for (int r = 0; r < kSide; ++r) {
-    for (int half = 0; half < 2; ++half) {
-      const Float4 v = wy[0] * rows[r][half] + wy[1] * rows[r + 1][half] + wy[2] * rows[r + 2][half] +
-                       wy[3] * rows[r + 3][half] + wy[4] * rows[r + 4][half];
-      std::memcpy(out->data() + r * kSide + 4 * half, &v, sizeof(v));
-    }
-  }
+  *out = kernels.window_sums(image.data + static_cast<std::ptrdiff_t>(iy - 2) * image.stride_bytes + ix - 2,
+                             image.stride_bytes, wx, wy, with);
   return true;
 }
 
-float dot(const Window& a, const Window& b) {
+float dot(const float* a, const float* b) {
   Float4 total = {};
-  for (std::size_t i = 0; i < kCount; i += 4) total += load4(&a[i]) * load4(&b[i]);
+  for (std::size_t i = 0; i < kCount; i += 4) total += load4(a + i) * load4(b + i);
   return sum(total);
 }
 
-void subtract_mean(Window* w) {
+void subtract_mean(float* w) {
   Float4 total = {};
-  for (std::size_t i = 0; i < kCount; i += 4) total += load4(&(*w)[i]);
+  for (std::size_t i = 0; i < kCount; i += 4) total += load4(w + i);
   const float mean = sum(total) / kCount;
-  for (float& v : *w) v -= mean;
+  for (std::size_t i = 0; i < kCount; ++i) w[i] -= mean;
 }
 
 // Template made free of brightness: the model is image(p + d) = gain * template(d + shift) + offset, and
 // gradients orthogonal to the template and to a constant see the shift alone.
 struct Normalised {
-  Window unit;     // template, zero mean, norm 1
-  Window dx, dy;   // gradients, orthogonal to `unit` and to 1
+  // value: template, zero mean, norm 1; dx, dy: gradients, orthogonal to that and to 1.
+  PatchTemplate unit;
   float norm = 0;  // of the zero-mean template
   Eigen::Matrix2f inverse_hessian;
 };
 
-bool normalise(Template* t, Normalised* n) {
-  subtract_mean(&t->value);
-  n->norm = std::sqrt(dot(t->value, t->value));
+// Of n->unit, as warped. False where it shows nothing that could be aligned.
+bool normalise(Normalised* n) {
+  PatchTemplate& t = n->unit;
+  subtract_mean(t.value);
+  n->norm = std::sqrt(dot(t.value, t.value));
   // Flat: less contrast than the noise.
   if (!(n->norm > kMinNoise * kSide)) return false;
-  for (std::size_t i = 0; i < kCount; ++i) n->unit[i] = t->value[i] / n->norm;
-  const auto free_of_brightness = [n](Window* gradient, Window* out) {
+  for (float& v : t.value) v /= n->norm;
+  for (float* gradient : {t.dx, t.dy}) {
     subtract_mean(gradient);
-    const float along = dot(*gradient, n->unit);
-    for (std::size_t i = 0; i < kCount; ++i) (*out)[i] = (*gradient)[i] - along * n->unit[i];
-  };
-  free_of_brightness(&t->dx, &n->dx);
-  free_of_brightness(&t->dy, &n->dy);
-  const float xx = dot(n->dx, n->dx), xy = dot(n->dx, n->dy), yy = dot(n->dy, n->dy);
+    const float along = dot(gradient, t.value);
+    for (std::size_t i = 0; i < kCount; ++i) gradient[i] -= along * t.value[i];
+  }
+  const float xx = dot(t.dx, t.dx), xy = dot(t.dx, t.dy), yy = dot(t.dy, t.dy);
   const float determinant = xx * yy - xy * xy;
   if (!(determinant > 1e-6F * (xx + yy) * (xx + yy))) return false;
   n->inverse_hessian << yy, -xy, -xy, xx;
   n->inverse_hessian /= determinant;
   return true;
-}
-
-// What one iteration needs of a window: its energy about its mean, and its products with the template.
-struct Products {
-  float energy, along, dx, dy;
-};
-
-// In one pass. The template's parts have zero mean, so that the window's own mean drops out of the products.
-Products multiply(const Window& window, const Normalised& n) {
-  Float4 total = {}, square = {}, along = {}, dx = {}, dy = {};
-  // About some grey level in the middle: the squares then keep their digits.
-  const Float4 reference = Float4{} + window[kCount / 2];
-  for (std::size_t i = 0; i < kCount; i += 4) {
-    const Float4 v = load4(&window[i]) - reference;
-    total += v;
-    square += v * v;
-    along += v * load4(&n.unit[i]);
-    dx += v * load4(&n.dx[i]);
-    dy += v * load4(&n.dy[i]);
-  }
-  const float mean_part = sum(total);
-  return {sum(square) - mean_part * mean_part / kCount, sum(along), sum(dx), sum(dy)};
 }
 
 float largest_eigenvalue(const Eigen::Matrix2f& m) {
@@ -307,22 +212,23 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   const float area = B.determinant();
   if (!(area < kMaxScale * kMaxScale && area * kMaxScale * kMaxScale > 1)) return result;
 
-  Template warped;
+  const Kernels& kernels = active_kernels();
   Normalised host_template;
-  if (!warp_template(host, B, &warped) || !normalise(&warped, &host_template)) return result;
+  if (!warp_template(kernels, host, B, &host_template.unit) || !normalise(&host_template)) return result;
 
   const ImageView image = pyramid_->level(level);
   const Eigen::Vector2f half(0.5F, 0.5F);
   const Eigen::Vector2f start = (predicted_px + half) / scale - half;
   Eigen::Vector2f p = start;
-  Window window;
   float gain = 0, variance = 0;
   bool converged = false;
   for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
-    if (!sample_window(image, p.x(), p.y(), &window)) return result;
-    const Products product = multiply(window, host_template);
+    // The template's parts have zero mean, so that the window's own mean drops out of the products.
+    WindowSums product;
+    if (!sample_window(kernels, image, p.x(), p.y(), host_template.unit, &product)) return result;
+    const float energy = product.square - product.value * product.value / kCount;
     gain = product.along / host_template.norm;
-    result.zncc = product.energy > 0 ? product.along / std::sqrt(product.energy) : 0;
+    result.zncc = energy > 0 ? product.along / std::sqrt(energy) : 0;
     // A start half a texture period away shows no or negative correlation: there is no way down from here.
     if (!(result.zncc > 0.1F)) return result;
     Eigen::Vector2f step = host_template.inverse_hessian * Eigen::Vector2f(product.dx, product.dy) / gain;
@@ -331,7 +237,7 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
     p -= step;
     if (!((p - start).squaredNorm() * scale * scale <= max_shift_px * max_shift_px)) return result;
     converged = length < kConverged;
-    variance = (product.energy - product.along * product.along) / (kCount - 4);
+    variance = (energy - product.along * product.along) / (kCount - 4);
   }
   const float noise = std::max(variance, kMinNoise * kMinNoise);
   const Eigen::Matrix2f covariance =

@@ -1,6 +1,7 @@
 // The inner loops of image processing, as a table of functions: a plain C++ version, which is the definition
 // and the reference of the tests, and Highway versions for every instruction set, chosen at run time. All
-// arithmetic is integer, and every version gives the same bits.
+// arithmetic is integer, or float in one fixed
+// order of operations, and every version gives the same bits.
 #pragma once
 
 #include <cstddef>
@@ -40,6 +41,48 @@ struct CentroidMoments {
   std::int32_t m01 = 0;  // sum of y * intensity
 };
 
+// Points in an image, one array a coordinate. Up to kRowAlignment elements behind the last are read.
+struct PointArrays {
+  const float* u_px = nullptr;
+  const float* v_px = nullptr;
+  const float* angle_rad = nullptr;  // -pi..pi
+  const float* level = nullptr;
+};
+
+// The surroundings of a line segment, and what else a point of it must be like.
+struct Band {
+  float u_px = 0, v_px = 0;               // where the segment begins
+  float along_u = 1, along_v = 0;         // its direction, unit
+  float length_px = 0;                    // of the segment
+  float half_width_px = 0;                // to each side, and beyond each end
+  float min_level = 0, max_level = 0;     // inclusive
+  float angle_rad = 0, max_turn_rad = 0;  // largest difference of angles, 0..pi
+};
+
+// Patch alignment (alignment.cc): side of a patch, and of the template that is warped from it.
+inline constexpr int kAlignPatchSide = 16;
+inline constexpr int kTemplateSide = 8;
+inline constexpr int kTemplateCount = kTemplateSide * kTemplateSide;
+
+// Template pixel (i, j), i along the row, reads the patch at (x0 + xi i + xj j, y0 + yi i + yj j), which must
+// lie in 0.5 .. 14.5.
+struct PatchSampling {
+  float x0 = 0, xi = 1, xj = 0;
+  float y0 = 0, yi = 0, yj = 1;
+  float share = 1;  // of this sample in the template pixel's mean
+};
+
+// A patch as seen from the target level: values, and derivatives by the target's pixel.
+struct PatchTemplate {
+  alignas(64) float value[kTemplateCount], dx[kTemplateCount], dy[kTemplateCount];
+};
+
+// Sums over a window w of an image, about one of its pixels: v = w - w[32].
+struct WindowSums {
+  float value = 0, square = 0;      // of v, v v
+  float along = 0, dx = 0, dy = 0;  // of v times the template's arrays
+};
+
 struct Kernels {
   const char* name;
 
@@ -74,6 +117,23 @@ struct Kernels {
   CentroidMoments (*centroid)(const std::uint8_t* centre, std::ptrdiff_t stride);
   // Bit i of the result: patch[offsets[2 i]] < patch[offsets[2 i + 1]], for i < 256.
   void (*compare_pairs)(const std::uint8_t* patch, const std::uint16_t* offsets, std::uint64_t bits[4]);
+
+  // distances[i] = number of bits in which `query` and the 256 bits at descriptors + 4 * indices[i] differ.
+  void (*hamming)(const std::uint64_t query[4], const std::uint64_t* descriptors,
+                  const std::uint32_t* indices, int count, std::uint16_t* distances);
+  // Positions of [begin, end) that lie in the band, ascending. Returns how many were written to `out`.
+  int (*select_in_band)(const PointArrays& points, int begin, int end, const Band& band, std::uint32_t* out);
+
+  // [1 2 1] / 4 along both axes of a 16x16 patch; pixels outside count as their neighbour inside.
+  void (*smooth_patch)(const std::uint8_t* patch, float* out);
+  // Adds `share` of the quadratic B-spline of the smoothed patch at the sampling's positions, and of its
+  // derivatives by (i, j), to the template.
+  void (*sample_patch)(const float* smooth, const PatchSampling& sampling, PatchTemplate* out);
+  // The 8x8 window of an image that has the weights wx over five columns and wy over five rows; `corner` is
+  // the first of 12x12 pixels. Floats are summed in eight partial sums,
+  // one a column, each from the top, and these pairwise: every version gives the same bits.
+  WindowSums (*window_sums)(const std::uint8_t* corner, std::ptrdiff_t stride, const float wx[5],
+                            const float wy[5], const PatchTemplate& with);
 };
 
 [[nodiscard]] const Kernels& plain_kernels();

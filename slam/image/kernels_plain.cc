@@ -1,5 +1,7 @@
 // The definition of every kernel, without any cleverness. The Highway versions must give the same bits.
 #include <algorithm>
+#include <bit>
+#include <cmath>
 
 #include "slam/image/kernels.h"
 
@@ -123,8 +125,118 @@ void compare_pairs(const std::uint8_t* patch, const std::uint16_t* offsets, std:
   }
 }
 
-constexpr Kernels kPlain = {"plain",        resample_row, combine_rows, blur_row,     blur_column,
-                            fast_score_row, maxima_row,   centroid,     compare_pairs};
+void hamming(const std::uint64_t query[4], const std::uint64_t* descriptors, const std::uint32_t* indices,
+             int count, std::uint16_t* distances) {
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t* other = descriptors + 4 * static_cast<std::size_t>(indices[i]);
+    int sum = 0;
+    for (int word = 0; word < 4; ++word) sum += std::popcount(query[word] ^ other[word]);
+    distances[i] = static_cast<std::uint16_t>(sum);
+  }
+}
+
+int select_in_band(const PointArrays& points, int begin, int end, const Band& band, std::uint32_t* out) {
+  constexpr float kTurn = 6.2831853F;
+  int count = 0;
+  for (int i = begin; i < end; ++i) {
+    const float du = points.u_px[i] - band.u_px, dv = points.v_px[i] - band.v_px;
+    const float along = du * band.along_u + dv * band.along_v;
+    const float across = std::abs(dv * band.along_u - du * band.along_v);
+    const float turn = std::abs(points.angle_rad[i] - band.angle_rad);
+    const bool inside = across <= band.half_width_px && along >= -band.half_width_px &&
+                        along <= band.length_px + band.half_width_px;
+    const bool alike = std::min(turn, kTurn - turn) <= band.max_turn_rad &&
+                       points.level[i] >= band.min_level && points.level[i] <= band.max_level;
+    if (inside && alike) out[count++] = static_cast<std::uint32_t>(i);
+  }
+  return count;
+}
+
+void smooth_patch(const std::uint8_t* patch, float* out) {
+  constexpr int kSide = kAlignPatchSide;
+  const auto inside = [](int i) { return std::clamp(i, 0, kSide - 1); };
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      int sum = 0;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i)
+          sum += (2 - std::abs(i)) * (2 - std::abs(j)) * patch[inside(y + j) * kSide + inside(x + i)];
+      out[y * kSide + x] = static_cast<float>(sum) * 0.0625F;
+    }
+  }
+}
+
+// The quadratic B-spline: weights of the pixels nearest - 1, nearest, nearest + 1 at offset t from the
+// nearest, |t| <= 0.5, and their derivatives.
+struct SplineWeights {
+  float weight[3], slope[3];
+};
+SplineWeights spline(float t) {
+  const float half_square = 0.5F * (t * t), half = 0.5F * t;
+  return {{(0.125F - half) + half_square, 0.75F - t * t, (0.125F + half) + half_square},
+          {t - 0.5F, -2.0F * t, t + 0.5F}};
+}
+
+void sample_patch(const float* smooth, const PatchSampling& s, PatchTemplate* out) {
+  for (int at = 0; at < kTemplateCount; ++at) {
+    const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
+    const float x = (s.x0 + s.xj * j) + s.xi * i, y = (s.y0 + s.yj * j) + s.yi * i;
+    const int nearest_x = static_cast<int>(x + 0.5F), nearest_y = static_cast<int>(y + 0.5F);
+    const SplineWeights wx = spline(x - static_cast<float>(nearest_x)),
+                        wy = spline(y - static_cast<float>(nearest_y));
+    const float* p = smooth + (nearest_y - 1) * kAlignPatchSide + nearest_x - 1;
+    float across[3], down[3];  // of each column
+    for (int k = 0; k < 3; ++k) {
+      const float top = p[k], middle = p[k + kAlignPatchSide], bottom = p[k + 2 * kAlignPatchSide];
+      across[k] = (wy.weight[0] * top + wy.weight[1] * middle) + wy.weight[2] * bottom;
+      down[k] = (wy.slope[0] * top + wy.slope[1] * middle) + wy.slope[2] * bottom;
+    }
+    const auto mix = [](const float w[3], const float c[3]) {
+      return (w[0] * c[0] + w[1] * c[1]) + w[2] * c[2];
+    };
+    const float slope_x = mix(wx.slope, across), slope_y = mix(wx.weight, down);
+    out->value[at] += s.share * mix(wx.weight, across);
+    out->dx[at] += s.share * (s.xi * slope_x + s.yi * slope_y);
+    out->dy[at] += s.share * (s.xj * slope_x + s.yj * slope_y);
+  }
+}
+
+float mix5(const float w[5], float a, float b, float c, float d, float e) {
+  return (((w[0] * a + w[1] * b) + w[2] * c) + w[3] * d) + w[4] * e;
+}
+
+WindowSums window_sums(const std::uint8_t* corner, std::ptrdiff_t stride, const float wx[5],
+                       const float wy[5], const PatchTemplate& with) {
+  constexpr int kSide = kTemplateSide;
+  float rows[kSide + 4][kSide], window[kTemplateCount];
+  for (int r = 0; r < kSide + 4; ++r) {
+    const std::uint8_t* p = corner + r * stride;
+    for (int c = 0; c < kSide; ++c) rows[r][c] = mix5(wx, p[c], p[c + 1], p[c + 2], p[c + 3], p[c + 4]);
+  }
+  for (int r = 0; r < kSide; ++r)
+    for (int c = 0; c < kSide; ++c)
+      window[r * kSide + c] =
+          mix5(wy, rows[r][c], rows[r + 1][c], rows[r + 2][c], rows[r + 3][c], rows[r + 4][c]);
+  const float reference = window[kTemplateCount / 2];
+  float sums[5][kSide] = {};
+  for (int at = 0; at < kTemplateCount; ++at) {
+    const float v = window[at] - reference;
+    const int c = at % kSide;
+    sums[0][c] += v;
+    sums[1][c] += v * v;
+    sums[2][c] += v * with.value[at];
+    sums[3][c] += v * with.dx[at];
+    sums[4][c] += v * with.dy[at];
+  }
+  const auto total = [](const float s[kSide]) {
+    return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+  };
+  return {total(sums[0]), total(sums[1]), total(sums[2]), total(sums[3]), total(sums[4])};
+}
+
+constexpr Kernels kPlain = {"plain",        resample_row, combine_rows, blur_row,      blur_column,
+                            fast_score_row, maxima_row,   centroid,     compare_pairs, hamming,
+                            select_in_band, smooth_patch, sample_patch, window_sums};
 
 }  // namespace
 

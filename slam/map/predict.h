@@ -1,9 +1,12 @@
 // Where a landmark should appear in a camera, and how to find it there. Shared by tracking and mapping.
 #pragma once
 
+#include <array>
 #include <cmath>
+
 #include "slam/geometry/camera.h"
 #include "slam/image/feature_grid.h"
+#include "slam/image/kernels.h"
 #include "slam/map/landmark.h"
 
 namespace farpoint::slam {
@@ -25,7 +28,27 @@ struct PredictionInput {
   Eigen::Matrix<double, 3, 2> d_point_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();
 };
 
-// False where the landmark does not project into the camera's image (border_px from the edge).
+// Predicts many landmarks in one camera.
+class Predictor {
+ public:
+  // `camera` must outlive the predictor.
+  Predictor(const Camera& camera, const SE3& T_camera_world)
+      : camera_(camera), R_(T_camera_world.rotation()), t_(T_camera_world.t) {}
+  // False where the landmark does not project into the camera's image (border_px from the edge).
+  [[nodiscard]] bool predict(const PredictionInput& in, double border_px, Prediction* out) const {
+    return predict(in.point_w, in.anchor_w, in.d_point_d_pixel, border_px, out);
+  }
+  [[nodiscard]] bool predict(const Eigen::Vector4d& point_w, const Eigen::Vector3d& anchor_w,
+                             const Eigen::Matrix<double, 3, 2>& d_point_d_pixel, double border_px,
+                             Prediction* out) const;
+
+ private:
+  const Camera& camera_;
+  const Eigen::Matrix3d R_;  // camera from world
+  const Eigen::Vector3d t_;
+};
+
+// The same of a single one.
 [[nodiscard]] bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camera_world,
                            double border_px, Prediction* out);
 
@@ -54,9 +77,21 @@ template <typename Usable>
   int best = -1, best_distance = kNone, second_distance = kNone;
   bool uncertain = false;  // second_distance was taken around another best one
   const auto visit = [&](auto&& consider) {
+    std::array<std::uint32_t, 64> indices;
+    std::array<std::uint16_t, 64> distances;
+    std::size_t count = 0;
+    const auto flush = [&] {
+      active_kernels().hamming(q.descriptor.words.data(), set.descriptors.front().words.data(),
+                               indices.data(), static_cast<int>(count), distances.data());
+      for (std::size_t k = 0; k < count; ++k) consider(std::size_t{indices[k]}, int{distances[k]});
+      count = 0;
+    };
     grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
-      if (usable(i)) consider(i, hamming_distance(q.descriptor, set.descriptors[i]));
+      if (!usable(i)) return;
+      indices[count++] = static_cast<std::uint32_t>(i);
+      if (count == indices.size()) flush();
     });
+    if (count > 0) flush();
   };
   const auto at_best = [&](std::size_t i) {
     return best >= 0 && same_place(set.features[static_cast<std::size_t>(best)], set.features[i]);

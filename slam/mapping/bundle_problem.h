@@ -106,6 +106,16 @@ class BundleFrames {
     return views_[static_cast<std::size_t>(m.pose) * cameras_ + static_cast<std::size_t>(m.camera)];
   }
   [[nodiscard]] WorldPoint world_point(const BundleProblem::Point& point) const;
+  // The same, where the bearing in the host's body axes is known already: it never changes.
+  [[nodiscard]] WorldPoint world_point(const BundleProblem::Point& point,
+                                       const Eigen::Vector3d& bearing_body) const {
+    const Body& host = body(point.host);
+    WorldPoint w;
+    w.inverse_depth = point.inverse_depth;
+    w.d_xyz_d_inverse_depth = host.R_world_body * point.T_host_anchor.t + host.t_world_body;
+    w.xyz = host.R_world_body * bearing_body + w.inverse_depth * w.d_xyz_d_inverse_depth;
+    return w;
+  }
 
  private:
   std::size_t cameras_ = 0;

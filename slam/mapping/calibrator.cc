@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/mapping/schur_blocks.h"
+
 namespace farpoint::slam {
 
 namespace {
@@ -12,33 +14,189 @@ constexpr int kParameters = 4;
 using Jacobian24 = Eigen::Matrix<double, 2, kParameters>;
 using Vector4 = Eigen::Vector4d;
 
-// Steps of the numeric derivative of a projection by delta: a few hundredths of a pixel in the image.
-const Vector4 kSteps(1e-5, 1e-2, 1e-2, 1e-4);
-
-// d(pixel)/d(delta) by central differences: the same code for every camera model.
-class ProjectionDerivative {
- public:
-  ProjectionDerivative(const Camera& given, const CalibrationDelta& delta) {
-    for (int i = 0; i < kParameters; ++i) {
-      CalibrationDelta step = CalibrationDelta::Zero();
-      step[i] = kSteps[i];
-      plus_[static_cast<std::size_t>(i)] = refined_camera(given, delta + step);
-      minus_[static_cast<std::size_t>(i)] = refined_camera(given, delta - step);
-    }
+// d(pixel)/d(delta) at a point that projects to `pixel`.
+Jacobian24 parameter_derivative(const Camera& camera, const Eigen::Vector3d& point_c,
+                                const Eigen::Vector2d& pixel) {
+  const Camera::Parameters& p = camera.parameters();
+  const double x = point_c.x(), y = point_c.y(), z = point_c.z();
+  // The first coefficient k1 moves the distorted (x, y) on the plane z = 1 by so much of (x, y) itself:
+  // radial-tangential r^2 / z, Kannala-Brandt theta^3 / rho.
+  double factor = 0.0;
+  if (p.model == CameraModel::kPinholeRadtan) {
+    factor = (x * x + y * y) / (z * z * z);
+  } else if (const double rho = std::hypot(x, y); rho > 0.0) {
+    const double theta = std::atan2(rho, z);
+    factor = theta * theta * theta / rho;
   }
-  [[nodiscard]] bool at(const Eigen::Vector3d& point_c, Jacobian24* J) const {
-    for (int i = 0; i < kParameters; ++i) {
-      Eigen::Vector2d a, b;
-      if (!plus_[static_cast<std::size_t>(i)].project(point_c, &a) ||
-          !minus_[static_cast<std::size_t>(i)].project(point_c, &b))
-        return false;
-      J->col(i) = (a - b) / (2.0 * kSteps[i]);
+  Jacobian24 J;
+  J.col(0) = pixel - Eigen::Vector2d(p.cx_px, p.cy_px);  // delta[0] is the logarithm of the focal length
+  J.col(1) = Eigen::Vector2d::UnitX();
+  J.col(2) = Eigen::Vector2d::UnitY();
+  J.col(3) = Eigen::Vector2d(p.fx_px * x, p.fy_px * y) * factor;
+  return J;
+}
+
+// The normal equations of poses and calibration, inverse depths eliminated point by point.
+class WindowEquations {
+ public:
+  WindowEquations(const BundleProblem& problem, const Camera& camera) : p_(problem), camera_(camera) {
+    free_index_.assign(p_.poses.size(), -1);
+    for (std::size_t i = 0; i < p_.poses.size(); ++i)
+      if (!p_.poses[i].fixed) free_index_[i] = free_++;
+    poses_.resize(free_);
+    poses_.set_zero();
+    border_.assign(static_cast<std::size_t>(free_), Matrix64::Zero());
+    gradient_.assign(static_cast<std::size_t>(free_), Vector6d::Zero());
+    frames_.update(p_);
+  }
+
+  // d_bearing: of the point, by its host pixel.
+  void add(const BundleProblem::Point& point, const Eigen::Matrix<double, 3, 2>& d_bearing) {
+    Eigen::Vector2d host_pixel;
+    if (!camera_.project(point.bearing, &host_pixel)) return;
+    const Jacobian24 d_host_pixel = parameter_derivative(camera_, point.bearing, host_pixel);
+    world_ = frames_.world_point(point);
+    // The host's pixel is given; its bearing moves against what the projection would do.
+    const Eigen::Matrix<double, 3, kParameters> d_xyz_d_delta =
+        -(frames_.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing * d_host_pixel;
+    part_ = {};
+    couplings_.clear();
+    const int host = free_index_[static_cast<std::size_t>(point.host)];
+    HostSums sums;
+    for (int i = 0; i < point.measurements; ++i) {
+      const auto& m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      if (m.pose != point.host && m.chi2 <= kChi2TwoDof)
+        add_measurement(point, m, d_xyz_d_delta, host, &sums);
     }
+    if (host >= 0) add_host(host, frames_.body(point.host).t_world_body, sums);
+    H_.noalias() += part_.H;
+    g_ += part_.g;
+    if (part_.hessian > 0.0) eliminate_depth();
+  }
+
+  // Information matrix and gradient of the calibration alone, the poses eliminated. False where the poses
+  // are not determined.
+  bool reduce(Eigen::Matrix4d* H, Vector4* g) {
+    *H = H_;
+    *g = g_;
+    if (free_ == 0) return true;
+    const Eigen::Index n = 6 * free_;
+    Eigen::MatrixXd dense(n, n), border(n, kParameters);
+    Eigen::VectorXd gradient(n);
+    poses_.copy_to(&dense);
+    for (int i = 0; i < free_; ++i) {
+      border.middleRows<6>(6 * i) = border_[static_cast<std::size_t>(i)];
+      gradient.segment<6>(6 * i) = gradient_[static_cast<std::size_t>(i)];
+    }
+    // A little damping stands in for the scale, which a young window leaves open.
+    dense.diagonal() += (1e-6 * dense.diagonal().array() + 1e-9).matrix();
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Upper> factor(dense);
+    if (factor.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd X = factor.solve(border);
+    *H -= border.transpose() * X;
+    *g -= X.transpose() * gradient;
     return true;
   }
 
  private:
-  std::array<Camera, kParameters> plus_, minus_;
+  using Matrix64 = Eigen::Matrix<double, 6, kParameters>;
+  using Matrix34 = Eigen::Matrix<double, 3, kParameters>;
+
+  // One point's share of what concerns its depth and the calibration.
+  struct Part {
+    double hessian = 0, gradient = 0;  // of the inverse depth
+    Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
+    Vector4 g = Vector4::Zero(), w = Vector4::Zero();  // w: with the inverse depth
+  };
+  // The host's derivatives are carry(host) times these sums over all measurements.
+  struct HostSums {
+    Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero(), coupling = Eigen::Vector3d::Zero();
+    Matrix34 border = Matrix34::Zero();
+  };
+  struct Coupling {
+    int pose = 0;
+    Vector6d w = Vector6d::Zero();
+  };
+
+  void add_measurement(const BundleProblem::Point& point, const BundleProblem::Measurement& m,
+                       const Matrix34& d_xyz_d_delta, int host, HostSums* sums) {
+    const BundleFrames::View& view = frames_.view(m);
+    WorldLinearisation lin;
+    if (!linearise_world(world_, view, m, &lin)) return;
+    const Eigen::Vector3d p_c = view.R_camera_world * world_.xyz + world_.inverse_depth * view.t_camera_world;
+    const Jacobian24 d_pixel = parameter_derivative(camera_, p_c, m.pixel + m.sigma_px * lin.residual);
+    const Jacobian24 Jd = d_pixel / m.sigma_px + lin.d_xyz * d_xyz_d_delta;
+    part_.hessian += lin.d_inverse_depth.squaredNorm();
+    part_.gradient += lin.d_inverse_depth.dot(lin.residual);
+    part_.H.noalias() += Jd.transpose() * Jd;
+    part_.g.noalias() += Jd.transpose() * lin.residual;
+    part_.w.noalias() += Jd.transpose() * lin.d_inverse_depth;
+    if (host >= 0) {
+      sums->hessian.noalias() += lin.d_xyz.transpose() * lin.d_xyz;
+      sums->gradient.noalias() += lin.d_xyz.transpose() * lin.residual;
+      sums->coupling.noalias() += lin.d_xyz.transpose() * lin.d_inverse_depth;
+      sums->border.noalias() += lin.d_xyz.transpose() * Jd;
+    }
+    const int target = free_index_[static_cast<std::size_t>(m.pose)];
+    if (target < 0) return;
+    const Matrix26d J = carried(lin.d_xyz, -1.0, world_, frames_.body(m.pose).t_world_body);
+    poses_.at(target, target).noalias() += J.transpose() * J;
+    border_[static_cast<std::size_t>(target)].noalias() += J.transpose() * Jd;
+    gradient_[static_cast<std::size_t>(target)].noalias() += J.transpose() * lin.residual;
+    couple(target, J.transpose() * lin.d_inverse_depth);
+    if (host < 0) return;
+    const Matrix26d J_host = carried(lin.d_xyz, 1.0, world_, frames_.body(point.host).t_world_body);
+    if (host < target)
+      poses_.at(host, target).noalias() += J_host.transpose() * J;
+    else
+      poses_.at(target, host).noalias() += J.transpose() * J_host;
+  }
+
+  void add_host(int host, const Eigen::Vector3d& t_host, const HostSums& sums) {
+    const Matrix36d d = carry(world_, t_host);
+    poses_.at(host, host).noalias() += d.transpose() * (sums.hessian * d);
+    border_[static_cast<std::size_t>(host)].noalias() += d.transpose() * sums.border;
+    gradient_[static_cast<std::size_t>(host)].noalias() += d.transpose() * sums.gradient;
+    couple(host, d.transpose() * sums.coupling);
+  }
+
+  void couple(int pose, const Vector6d& w) {
+    for (Coupling& c : couplings_)
+      if (c.pose == pose) {
+        c.w += w;
+        return;
+      }
+    couplings_.push_back({pose, w});
+  }
+
+  void eliminate_depth() {
+    const double inverse = 1.0 / part_.hessian;
+    for (const Coupling& a : couplings_) {
+      const Vector6d scaled = inverse * a.w;
+      for (const Coupling& b : couplings_)
+        if (a.pose <= b.pose) poses_.at(a.pose, b.pose).noalias() -= scaled * b.w.transpose();
+      border_[static_cast<std::size_t>(a.pose)].noalias() -= scaled * part_.w.transpose();
+      gradient_[static_cast<std::size_t>(a.pose)] -= scaled * part_.gradient;
+    }
+    H_.noalias() -= inverse * part_.w * part_.w.transpose();
+    g_ -= (inverse * part_.gradient) * part_.w;
+  }
+
+  const BundleProblem& p_;
+  const Camera& camera_;
+  BundleFrames frames_;
+  std::vector<int> free_index_;
+  int free_ = 0;
+  BlockMatrix poses_;
+  std::vector<Matrix64> border_;  // of the free poses, with the calibration
+  std::vector<Vector6d> gradient_;
+  Eigen::Matrix4d H_ = Eigen::Matrix4d::Zero();
+  Vector4 g_ = Vector4::Zero();
+  // Of the point that is being added.
+  BundleFrames::WorldPoint world_;
+  Part part_;
+  std::vector<Coupling> couplings_;
 };
 
 }  // namespace
@@ -67,97 +225,10 @@ CalibrationDelta Calibrator::sigma() const {
 Calibrator::Quadratic Calibrator::window_information(
     const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
   Quadratic out;
-  std::vector<int> block(problem.poses.size(), -1);
-  int free = 0;
-  for (std::size_t i = 0; i < problem.poses.size(); ++i)
-    if (!problem.poses[i].fixed) block[i] = free++;
-  const Eigen::Index n = 6 * free + kParameters, c = 6 * free;
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(n), w = Eigen::VectorXd::Zero(n);
-  const ProjectionDerivative derivative(given_, delta_);
-  BundleFrames frames;
-  frames.update(problem);
-  std::vector<Eigen::Index> touched;
-
-  for (std::size_t k = 0; k < problem.points.size(); ++k) {
-    const BundleProblem::Point& point = problem.points[k];
-    const BundleFrames::WorldPoint world = frames.world_point(point);
-    Jacobian24 d_host_pixel;
-    if (!derivative.at(point.bearing, &d_host_pixel)) continue;
-    // The host's pixel is given; its bearing moves against what the projection would do.
-    const Eigen::Matrix<double, 3, kParameters> d_xyz_d_delta =
-        -(frames.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing[k] *
-        d_host_pixel;
-    double h = 0.0, gradient = 0.0;
-    touched.clear();
-    const auto add_pose = [&](int b, const Eigen::Matrix<double, 2, 6>& J, const BundleLinearisation& lin,
-                              double weight, const Jacobian24& Jd) {
-      const Eigen::Index at = 6 * b;
-      if (std::find(touched.begin(), touched.end(), at) == touched.end()) touched.push_back(at);
-      H.block<6, 6>(at, at).noalias() += weight * J.transpose() * J;
-      H.block<6, kParameters>(at, c).noalias() += weight * J.transpose() * Jd;
-      g.segment<6>(at).noalias() += weight * J.transpose() * lin.residual;
-      w.segment<6>(at).noalias() += weight * J.transpose() * lin.d_inverse_depth;
-    };
-    for (int i = 0; i < point.measurements; ++i) {
-      const auto& m = problem.measurements[static_cast<std::size_t>(point.first_measurement + i)];
-      BundleLinearisation lin;
-      WorldLinearisation lw;
-      Jacobian24 Jd;
-      if (m.pose == point.host || m.chi2 > kChi2TwoDof) continue;
-      if (!linearise(frames, point, m, &lin) || !linearise_world(world, frames.view(m), m, &lw)) continue;
-      const BundleFrames::View& view = frames.view(m);
-      const Eigen::Vector3d p_c = view.R_camera_world * world.xyz + world.inverse_depth * view.t_camera_world;
-      if (!derivative.at(p_c, &Jd)) continue;
-      Jd = (Jd / m.sigma_px + lw.d_xyz * d_xyz_d_delta).eval();
-      const double weight = 1.0;
-      h += lin.d_inverse_depth.squaredNorm();
-      gradient += lin.d_inverse_depth.dot(lin.residual);
-      const int bh = block[static_cast<std::size_t>(point.host)],
-                bt = block[static_cast<std::size_t>(m.pose)];
-      if (bh >= 0) add_pose(bh, lin.d_host, lin, weight, Jd);
-      if (bt >= 0) add_pose(bt, lin.d_target, lin, weight, Jd);
-      if (bh >= 0 && bt >= 0) {
-        const Eigen::Index r = 6 * std::min(bh, bt), q = 6 * std::max(bh, bt);
-        if (bh < bt)
-          H.block<6, 6>(r, q).noalias() += lin.d_host.transpose() * lin.d_target;
-        else
-          H.block<6, 6>(r, q).noalias() += lin.d_target.transpose() * lin.d_host;
-      }
-      H.block<kParameters, kParameters>(c, c).noalias() += Jd.transpose() * Jd;
-      g.segment<kParameters>(c).noalias() += Jd.transpose() * lin.residual;
-      w.segment<kParameters>(c).noalias() += Jd.transpose() * lin.d_inverse_depth;
-    }
-    if (h > 0.0) {
-      const double inverse = 1.0 / h;
-      for (std::size_t a = 0; a < touched.size(); ++a) {
-        const Vector6d scaled = inverse * w.segment<6>(touched[a]);
-        for (std::size_t b = 0; b < touched.size(); ++b)
-          if (touched[a] <= touched[b])
-            H.block<6, 6>(touched[a], touched[b]).noalias() -= scaled * w.segment<6>(touched[b]).transpose();
-        H.block<6, kParameters>(touched[a], c).noalias() -= scaled * w.segment<kParameters>(c).transpose();
-        g.segment<6>(touched[a]) -= scaled * gradient;
-      }
-      const Vector4 scaled = inverse * w.segment<kParameters>(c);
-      H.block<kParameters, kParameters>(c, c).noalias() -= scaled * w.segment<kParameters>(c).transpose();
-      g.segment<kParameters>(c) -= scaled * gradient;
-    }
-    for (const Eigen::Index at : touched) w.segment<6>(at).setZero();
-    w.segment<kParameters>(c).setZero();
-  }
-  // Poses eliminated; a little damping stands in for the scale, which a young window leaves open.
-  for (Eigen::Index i = 0; i < c; ++i) H(i, i) += 1e-6 * H(i, i) + 1e-9;
-  if (c > 0) {
-    const Eigen::MatrixXd Hpp = H.topLeftCorner(c, c).selfadjointView<Eigen::Upper>();
-    const Eigen::LLT<Eigen::MatrixXd> factor(Hpp);
-    if (factor.info() != Eigen::Success) return out;
-    const Eigen::MatrixXd X = factor.solve(H.block(0, c, c, kParameters));
-    out.H = H.block<kParameters, kParameters>(c, c) - H.block(0, c, c, kParameters).transpose() * X;
-    out.g = g.segment<kParameters>(c) - X.transpose() * g.head(c);
-  } else {
-    out.H = H;
-    out.g = g;
-  }
+  const Camera now = camera();
+  WindowEquations equations(problem, now);
+  for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
+  if (!equations.reduce(&out.H, &out.g)) return out;
   out.H = (0.5 * (out.H + out.H.transpose())).eval();
   out.usable = out.H.allFinite() && out.g.allFinite();
   return out;

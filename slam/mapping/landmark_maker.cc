@@ -24,16 +24,21 @@ constexpr float kMaxAngleDifference_rad = 0.6F;
 constexpr double kPoseSigma_px = 0.5;
 constexpr std::uint64_t kBearingLife_keyframes = 12;
 constexpr int kMaxFailures = 3;
-
-float angle_difference(float a, float b) {
-  const float d = std::fabs(a - b);
-  return d > 3.14159265F ? 6.2831853F - d : d;
-}
+// Poses and corners put a feature this far from its epipolar line, pixels of its pyramid level.
+constexpr float kBand_level_px = 3.0F;
+// The same corner is found up to so many pyramid levels away from where its size says.
+constexpr int kLevelReach = 3;
+// A match must beat the second best on the line by so much: along it every depth is as likely.
+constexpr float kSecondBest = 0.85F;
 
 }  // namespace
 
 LandmarkMaker::LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts)
-    : config_(config), map_(*map), counts_(*counts) {}
+    : config_(config), map_(*map), counts_(*counts) {
+  for (int l = 0; l < config.pyramid.levels; ++l)
+    level_scale_.push_back(static_cast<float>(std::pow(config.pyramid.scale_factor, l)));
+  seen_by_.assign(map->landmarks().capacity(), 0);
+}
 
 bool LandmarkMaker::wanted(LandmarkHandle handle) const {
   if (handle.is_null()) return true;
@@ -56,106 +61,82 @@ void LandmarkMaker::process(KeyframeHandle newer, const std::vector<KeyframeHand
 LandmarkMaker::PairGeometry LandmarkMaker::relate(const Keyframe& newer, const Keyframe& older) const {
   PairGeometry g;
   g.T_new_old = map_.T_world_camera(newer).inverse() * map_.T_world_camera(older);
+  const SE3 T_old_new = g.T_new_old.inverse();
+  g.R_old_new = T_old_new.rotation();
+  g.t_old_new = T_old_new.t;
   const double baseline = g.T_new_old.t.norm();
   // Depth of the scene as the older keyframe sees it.
   std::vector<double> inverse_depths;
   const SE3 T_old_world = map_.T_world_camera(older).inverse();
-  for (const LandmarkHandle h : older.landmarks) {
-    const Landmark* l = map_.landmarks().get(h);
+  // A share of the landmarks gives the median well enough.
+  constexpr std::size_t kStride = 3;
+  for (std::size_t i = 0; i < older.landmarks.size(); i += kStride) {
+    const Landmark* l = map_.landmarks().get(older.landmarks[i]);
     if (l == nullptr || l->state == LandmarkState::kBearing) continue;
     const Eigen::Vector4d p = map_.world_point(*l);
     const double distance = (T_old_world.q * p.head<3>() + p[3] * T_old_world.t).norm();
     inverse_depths.push_back(p[3] / std::max(distance, 1e-9));
   }
-  if (inverse_depths.size() < 10) return g;
+  if (inverse_depths.size() < 4) return g;
   const auto middle = inverse_depths.begin() + static_cast<std::ptrdiff_t>(inverse_depths.size() / 2);
   std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
   const double median_inverse_depth = *middle;
   g.max_inverse_depth = median_inverse_depth / kNearShare;
-  g.epipole_old = g.T_new_old.inverse().t;
   // Without a base there is neither an epipolar line nor parallax.
   g.valid = baseline * median_inverse_depth > 0.002;
   return g;
 }
 
-int LandmarkMaker::search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older,
-                                   const PairGeometry& g, int* distance) const {
-  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(older.camera)].camera;
-  const Feature& f = newer.set.features[feature];
-  const SE3 T_old_new = g.T_new_old.inverse();
-  const Eigen::Vector3d far = T_old_new.q * newer.bearings[feature].cast<double>();
-  // The epipolar segment from infinity to the nearest depth, in pixels of the older keyframe.
-  Eigen::Vector2d a, b;
-  if (!camera.project(far, &a)) return -1;
+bool LandmarkMaker::epipolar_segment(const Eigen::Vector3f& bearing_new, const Camera& camera_old,
+                                     const PairGeometry& g, Eigen::Vector2d* far, Eigen::Vector2d* near) {
+  const Eigen::Vector3d direction = g.R_old_new * bearing_new.cast<double>();
+  if (!camera_old.project(direction, far)) return false;
   double rho = g.max_inverse_depth;
-  bool visible = camera.project(far + rho * T_old_new.t, &b);
+  bool visible = camera_old.project(direction + rho * g.t_old_new, near);
   for (int i = 0; i < 6 && !visible; ++i) {
     rho *= 0.5;
-    visible = camera.project(far + rho * T_old_new.t, &b);
+    visible = camera_old.project(direction + rho * g.t_old_new, near);
   }
-  if (!visible) return -1;
-  const float scale = static_cast<float>(std::pow(config_.pyramid.scale_factor, f.level));
-  const float band_px = 3.0F * scale;
-  const Eigen::Vector2d along = b - a;
-  const double length = along.norm();
-  const Eigen::Vector2d unit = length > 1e-6 ? Eigen::Vector2d(along / length) : Eigen::Vector2d(1.0, 0.0);
-  const Eigen::Vector2d normal(-unit.y(), unit.x());
-  constexpr double kStep_px = 24.0;
-  const int steps = std::min(64, static_cast<int>(length / kStep_px) + 1);
-
-  int best = -1, best_distance = config_.tracking.max_hamming + 1, second = 257;
-  for (int s = 0; s < steps; ++s) {
-    const double from = length * s / steps, to = length * (s + 1) / steps;
-    const Eigen::Vector2d middle = a + 0.5 * (from + to) * unit;
-    const auto radius = static_cast<float>(0.5 * (to - from)) + band_px;
-    older.grid.visit_near(
-        older.set.features, static_cast<float>(middle.x()), static_cast<float>(middle.y()), radius,
-        f.level - 3, f.level + 3, [&](std::size_t i) {
-          const Feature& o = older.set.features[i];
-          const Eigen::Vector2d d = Eigen::Vector2d(o.u_px, o.v_px) - a;
-          const double t = d.dot(unit);
-          if (t < from - band_px || t > to + band_px || std::fabs(d.dot(normal)) > band_px) return;
-          if (!wanted(older.landmarks[i])) return;
-          if (angle_difference(f.angle_rad, o.angle_rad) > kMaxAngleDifference_rad) return;
-          const int h = hamming_distance(newer.set.descriptors[feature], older.set.descriptors[i]);
-          if (static_cast<int>(i) == best) return;
-          if (h < best_distance) {
-            if (best >= 0 && !same_place(older.set.features[static_cast<std::size_t>(best)], o))
-              second = best_distance;
-            best_distance = h;
-            best = static_cast<int>(i);
-          } else if (h < second && best >= 0 &&
-                     !same_place(older.set.features[static_cast<std::size_t>(best)], o)) {
-            second = h;
-          }
-        });
-  }
-  if (best < 0 || static_cast<float>(best_distance) > 0.85F * static_cast<float>(second)) return -1;
-  *distance = best_distance;
-  return best;
+  return visible;
 }
 
 void LandmarkMaker::find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
                                std::vector<Pair>* out) {
   out->clear();
+  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(older.camera)].camera;
   best_of_old_.assign(older.set.features.size(), -1);
+  wanted_old_.resize(older.set.features.size());
+  ++round_;
+  for (std::size_t j = 0; j < older.landmarks.size(); ++j) {
+    const LandmarkHandle h = older.landmarks[j];
+    wanted_old_[j] = wanted(h) ? 1 : 0;
+    if (!h.is_null()) seen_by_[h.index] = round_;
+  }
+  index_.build(older.set, wanted_old_, camera.width_px(), camera.height_px());
+  EpipolarQuery query;
+  query.max_hamming = config_.tracking.max_hamming;
+  query.ratio = kSecondBest;
+  query.max_turn_rad = kMaxAngleDifference_rad;
   for (std::size_t i = 0; i < newer.set.features.size(); ++i) {
-    if (!wanted(newer.landmarks[i])) continue;
+    const LandmarkHandle at_new = newer.landmarks[i];
+    if (!wanted(at_new)) continue;
     // A VMP that the older keyframe sees already has nothing to find there.
-    if (const Landmark* l = map_.landmarks().get(newer.landmarks[i]); l != nullptr) {
-      bool seen = false;
-      for (const Observation& o : l->observations) seen = seen || &map_.keyframes()[o.keyframe] == &older;
-      if (seen) continue;
-    }
-    int distance = 0;
-    const int j = search_epipolar(newer, i, older, geometry, &distance);
-    if (j < 0) continue;
-    int& best = best_of_old_[static_cast<std::size_t>(j)];
-    const Pair pair{i, static_cast<std::size_t>(j), distance};
+    if (!at_new.is_null() && seen_by_[at_new.index] == round_) continue;
+    if (!epipolar_segment(newer.bearings[i], camera, geometry, &query.from_px, &query.to_px)) continue;
+    const Feature& f = newer.set.features[i];
+    query.half_width_px = kBand_level_px * level_scale_[f.level];
+    query.min_level = f.level - kLevelReach;
+    query.max_level = f.level + kLevelReach;
+    query.angle_rad = f.angle_rad;
+    query.descriptor = &newer.set.descriptors[i];
+    const EpipolarMatch match = index_.find(older.set, query);
+    if (match.feature < 0) continue;
+    int& best = best_of_old_[static_cast<std::size_t>(match.feature)];
+    const Pair pair{i, static_cast<std::size_t>(match.feature), match.distance};
     if (best < 0) {
       best = static_cast<int>(out->size());
       out->push_back(pair);
-    } else if (distance < (*out)[static_cast<std::size_t>(best)].distance) {
+    } else if (match.distance < (*out)[static_cast<std::size_t>(best)].distance) {
       (*out)[static_cast<std::size_t>(best)] = pair;
     }
   }

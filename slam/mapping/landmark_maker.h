@@ -7,6 +7,7 @@
 
 #include "slam/config.h"
 #include "slam/map/map.h"
+#include "slam/mapping/epipolar_index.h"
 #include "slam/mapping/statistics.h"
 
 namespace farpoint::slam {
@@ -39,8 +40,9 @@ class LandmarkMaker {
     int distance = 0;
   };
   struct PairGeometry {
-    SE3 T_new_old;                 // cameras
-    Eigen::Vector3d epipole_old;   // centre of the new camera seen from the old one
+    SE3 T_new_old;              // cameras
+    Eigen::Matrix3d R_old_new;  // the same the other way
+    Eigen::Vector3d t_old_new;
     double max_inverse_depth = 0;  // nearest depth searched
     bool valid = false;
   };
@@ -48,8 +50,10 @@ class LandmarkMaker {
   [[nodiscard]] PairGeometry relate(const Keyframe& newer, const Keyframe& older) const;
   void find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
                   std::vector<Pair>* out);
-  int search_epipolar(const Keyframe& newer, std::size_t feature, const Keyframe& older,
-                      const PairGeometry& geometry, int* distance) const;
+  // The epipolar segment of a feature from infinity to the nearest depth, in pixels of the other keyframe.
+  // False where nothing of it can be seen there.
+  static bool epipolar_segment(const Eigen::Vector3f& bearing_new, const Camera& camera_old,
+                               const PairGeometry& geometry, Eigen::Vector2d* far, Eigen::Vector2d* near);
   void consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
   void create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
   void attach(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature);
@@ -61,6 +65,12 @@ class LandmarkMaker {
   const EstimatorConfig& config_;
   Map& map_;
   MappingCounts& counts_;
+  std::vector<float> level_scale_;  // of each pyramid level
+  // Work space, reused.
+  EpipolarIndex index_;
+  std::vector<std::uint8_t> wanted_old_;  // one a feature of the older keyframe
+  std::vector<std::uint32_t> seen_by_;    // one a landmark slot: the round in which the older keyframe saw it
+  std::uint32_t round_ = 0;
   std::vector<Pair> pairs_;
   std::vector<int> best_of_old_;  // one a feature of the older keyframe: index in pairs_
 };

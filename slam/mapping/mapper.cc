@@ -151,10 +151,14 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
   attach_sightings(keyframe, request);
   cull_recent_landmarks();
   map_.update_covisibility(keyframe);
-  // What tracking saw was a view some frames old: the map of today may know more of these corners already.
-  search_neighbours_landmarks(keyframe);
+  {
+    // What tracking saw was a view some frames old: the map of today may know more of these corners already.
+    const StageSpan span(listener_, Stage::kFusing);
+    search_neighbours_landmarks(keyframe);
+  }
   map_.update_covisibility(keyframe);
 
+  const StageSpan span(listener_, Stage::kTriangulation);
   const std::uint64_t first_new = counts_.landmarks_made;
   maker_.process(keyframe, neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
   maker_.evict_bearings(keyframe);
@@ -173,11 +177,15 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
 
 std::shared_ptr<const LocalView> Mapper::refine() {
   if (!map_.keyframes().contains(newest_)) return nullptr;
-  fuse_neighbourhood(newest_);
+  {
+    const StageSpan span(listener_, Stage::kFusing);
+    fuse_neighbourhood(newest_);
+  }
   map_.update_covisibility(newest_);
   optimise(newest_, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
   if (config_.calibration.refine && consistent()) refine_calibration();
+  const StageSpan span(listener_, Stage::kCulling);
   cull_keyframes(newest_);
   limit_memory(newest_);
   map_.update_covisibility(newest_);
@@ -215,15 +223,14 @@ void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
 void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks) {
   Keyframe& keyframe = map_.keyframes()[handle];
   const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
-  const SE3 T_camera_world = map_.T_world_camera(keyframe).inverse();
+  const Predictor predictor(camera, map_.T_world_camera(keyframe).inverse());
   const double scale_factor = config_.pyramid.scale_factor;
   for (const LandmarkHandle& lh : landmarks) {
     const Landmark* l = map_.landmarks().get(lh);
     if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr)
       continue;
     Prediction p;
-    if (!predict(prediction_input(map_, *l), camera, T_camera_world, 4.0, &p) || p.view_cosine < 0.5)
-      continue;
+    if (!predictor.predict(prediction_input(map_, *l), 4.0, &p) || p.view_cosine < 0.5) continue;
     if (p.scale_change < 0.3F || p.scale_change > 3.3F) continue;
     const int level = predicted_level(l->host_level, p.scale_change, static_cast<float>(scale_factor),
                                       config_.pyramid.levels);
@@ -374,6 +381,7 @@ void Mapper::build_problem() {
 }
 
 void Mapper::optimise(KeyframeHandle centre, int iterations) {
+  const StageSpan span(listener_, Stage::kLocalBa);
   select_window(centre);
   build_problem();
   if (problem_.points.empty()) return;
@@ -387,6 +395,7 @@ void Mapper::optimise(KeyframeHandle centre, int iterations) {
 }
 
 void Mapper::refine_calibration() {
+  const StageSpan span(listener_, Stage::kCalibration);
   // Poses and depths are at their optimum for the present calibration: what is left in the residuals is
   // noise, or a calibration that is not quite right.
   std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size());
@@ -473,8 +482,11 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
        neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
     const Keyframe& k = map_.keyframes()[h];
     if (k.id + kKeepNewest > newest_id_) continue;
+    const auto most = static_cast<double>(
+        std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
     int points = 0, redundant = 0;
-    for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
+    // Ends where so many are needed that no more points can make the rest redundant.
+    for (std::size_t i = 0; i < k.landmarks.size() && points - redundant < (1.0 - kRedundant) * most; ++i) {
       const Landmark* l = map_.landmarks().get(k.landmarks[i]);
       if (l == nullptr || l->state == LandmarkState::kBearing) continue;
       ++points;
@@ -552,6 +564,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
 
   std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
   std::vector<double> depths;
+  view->landmarks.reserve(last_view_landmarks_ + last_view_landmarks_ / 4);
   const SE3 T_reference_world = map_.T_world_camera(centre).inverse();
   for (const KeyframeHandle& h : members) {
     const Keyframe& k = map_.keyframes()[h];
@@ -562,10 +575,10 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       taken[lh.index] = 1;
       ViewLandmark v;
       v.handle = lh;
-      v.point_w = map_.world_point(*l);
-      const SE3 T_world_anchor = map_.T_world_anchor(*l);
-      v.anchor_w = T_world_anchor.t;
-      v.d_point_d_pixel = T_world_anchor.rotation() * l->d_bearing_d_pixel;
+      const PredictionInput in = prediction_input(map_, *l);
+      v.point_w = in.point_w;
+      v.anchor_w = in.anchor_w;
+      v.d_point_d_pixel = in.d_point_d_pixel;
       v.inverse_depth_sigma = l->inverse_depth_sigma;
       v.descriptor = l->descriptor;
       v.patch = l->patch;
@@ -582,6 +595,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       view->landmarks.push_back(v);
     }
   }
+  last_view_landmarks_ = view->landmarks.size();
   std::sort(view->keyframes.begin(), view->keyframes.end(),
             [](const ViewKeyframe& a, const ViewKeyframe& b) { return a.id < b.id; });
   map_.keyframes().for_each(

@@ -16,12 +16,14 @@
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/statistics.h"
+#include "slam/stages.h"
 
 namespace farpoint::slam {
 
 class Mapper {
  public:
   Mapper(const EstimatorConfig& config, const Rig& rig);
+  void listen(StageListener* listener) { listener_ = listener; }
 
   // Starts a new map from two views. Null where the structure does not hold (too few points survive BA).
   std::shared_ptr<const LocalView> start_map(const InitialPair& pair, std::int32_t map_id);
@@ -70,10 +72,12 @@ class Mapper {
   MappingCounts counts_;
   LandmarkMaker maker_;
   Calibrator calibrator_;
+  StageListener* listener_ = nullptr;
 
   KeyframeHandle newest_;
   std::uint64_t newest_id_ = 0;
   std::uint64_t view_sequence_ = 0;
+  std::size_t last_view_landmarks_ = 0;  // in the last view: about as many will be in the next
   std::vector<LandmarkHandle> recent_;  // made not long ago, on probation
 
   // Settling: how much the last optimisations still changed the young map's unit.

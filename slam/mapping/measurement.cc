@@ -11,8 +11,13 @@ constexpr float kSearchLevelPixels = 2.0F;
 
 PredictionInput prediction_input(const Map& map, const Landmark& landmark) {
   const SE3 T_world_anchor = map.T_world_anchor(landmark);
-  return {map.world_point(landmark), T_world_anchor.t,
-          T_world_anchor.rotation() * landmark.d_bearing_d_pixel};
+  const Eigen::Matrix3d R_world_anchor = T_world_anchor.rotation();
+  PredictionInput in;
+  in.point_w.head<3>() = R_world_anchor * landmark.bearing + landmark.inverse_depth * T_world_anchor.t;
+  in.point_w[3] = landmark.inverse_depth;
+  in.anchor_w = T_world_anchor.t;
+  in.d_point_d_pixel = R_world_anchor * landmark.d_bearing_d_pixel;
+  return in;
 }
 
 bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark,

@@ -3,22 +3,16 @@
 // Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs k (k + 1)
 // / 2 rank-one 6x6 updates; general solvers do not specialise to that (tests/bench/bench_solvers.cc compares
 // with Ceres).
-//
-// Pose steps are taken in world axes here, (dt_w, dphi_w) = (R dt, R dphi) with the (dt, dphi) of se3.h: a
-// landmark's derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t,
-// without a rotation for every measurement, and the same for host and target but for the sign.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "slam/mapping/bundle_problem.h"
+#include "slam/mapping/schur_blocks.h"
 
 namespace farpoint::slam {
 
 namespace {
-
-using Matrix26d = Eigen::Matrix<double, 2, 6>;
-using Matrix36d = Eigen::Matrix<double, 3, 6>;
 
 double huber_cost(double squared) {
   const double r = std::sqrt(squared);
@@ -28,55 +22,6 @@ double huber_weight(double squared) {
   const double r = std::sqrt(squared);
   return r <= kHuberDelta ? 1.0 : kHuberDelta / r;
 }
-
-// d(xyz) by the pose that carries the point.
-Matrix36d carry(const BundleFrames::WorldPoint& point, const Eigen::Vector3d& t_world_body) {
-  Matrix36d d;
-  d.leftCols<3>() = point.inverse_depth * Eigen::Matrix3d::Identity();
-  d.rightCols<3>() = -skew(point.xyz - point.inverse_depth * t_world_body);
-  return d;
-}
-
-// scale * d_xyz * carry(point, t), without the multiplications by zero.
-Matrix26d carried(const Matrix23d& d_xyz, double scale, const BundleFrames::WorldPoint& point,
-                  const Eigen::Vector3d& t_world_body) {
-  const Eigen::Vector3d y = point.xyz - point.inverse_depth * t_world_body;
-  const Matrix23d d = scale * d_xyz;
-  Matrix26d J;
-  J.leftCols<3>() = point.inverse_depth * d;
-  J.col(3) = d.col(2) * y.y() - d.col(1) * y.z();
-  J.col(4) = d.col(0) * y.z() - d.col(2) * y.x();
-  J.col(5) = d.col(1) * y.x() - d.col(0) * y.y();
-  return J;
-}
-
-// Symmetric matrix of 6x6 blocks, upper triangle, each block in one piece of memory: the rank-one updates of
-// the Schur complement are most of the work, and stay within few cache lines.
-class BlockMatrix {
- public:
-  void resize(int blocks) {
-    blocks_ = blocks;
-    data_.resize(static_cast<std::size_t>(blocks * (blocks + 1) / 2));
-  }
-  void set_zero() {
-    for (Matrix6d& b : data_) b.setZero();
-  }
-  // row <= column
-  [[nodiscard]] Matrix6d& at(int row, int column) { return data_[index(row, column)]; }
-
-  // Upper triangle of `out`; the rest is untouched.
-  void copy_to(Eigen::MatrixXd* out) const {
-    for (int r = 0; r < blocks_; ++r)
-      for (int c = r; c < blocks_; ++c) out->block<6, 6>(6 * r, 6 * c) = data_[index(r, c)];
-  }
-
- private:
-  [[nodiscard]] std::size_t index(int row, int column) const {
-    return static_cast<std::size_t>(column * (column + 1) / 2 + row);
-  }
-  int blocks_ = 0;
-  std::vector<Matrix6d> data_;
-};
 
 // A landmark's part of the normal equations.
 struct PointBlock {
@@ -105,6 +50,8 @@ class SchurSolver {
     reduced_gradient_.resize(n);
     blocks_.resize(p_.points.size());
     couplings_.reserve(p_.measurements.size() + p_.points.size());
+    bearing_body_.reserve(p_.points.size());
+    for (const auto& point : p_.points) bearing_body_.push_back(point.T_host_anchor.q * point.bearing);
     frames_.update(p_);
   }
 
@@ -150,14 +97,15 @@ class SchurSolver {
   [[nodiscard]] double total_cost() {
     double sum = 0.0;
     point_cost_.clear();
-    for (const auto& point : p_.points) {
-      point_cost_.push_back(cost_of(point));
+    for (std::size_t k = 0; k < p_.points.size(); ++k) {
+      point_cost_.push_back(cost_of(k));
       sum += point_cost_.back();
     }
     return sum;
   }
-  [[nodiscard]] double cost_of(const BundleProblem::Point& point) const {
-    const BundleFrames::WorldPoint world = frames_.world_point(point);
+  [[nodiscard]] double cost_of(std::size_t k) const {
+    const BundleProblem::Point& point = p_.points[k];
+    const BundleFrames::WorldPoint world = frames_.world_point(point, bearing_body_[k]);
     double sum = 0.0;
     for (int i = 0; i < point.measurements; ++i) {
       Eigen::Vector2d r;
@@ -171,14 +119,15 @@ class SchurSolver {
     hessian_.set_zero();
     gradient_.setZero();
     couplings_.clear();
-    for (std::size_t k = 0; k < p_.points.size(); ++k) linearise_point(p_.points[k], &blocks_[k]);
+    for (std::size_t k = 0; k < p_.points.size(); ++k) linearise_point(k, &blocks_[k]);
   }
 
-  void linearise_point(const BundleProblem::Point& point, PointBlock* block) {
+  void linearise_point(std::size_t k, PointBlock* block) {
+    const BundleProblem::Point& point = p_.points[k];
     *block = {};
     block->first_coupling = static_cast<int>(couplings_.size());
     const int host = free_index_[static_cast<std::size_t>(point.host)];
-    const BundleFrames::WorldPoint world = frames_.world_point(point);
+    const BundleFrames::WorldPoint world = frames_.world_point(point, bearing_body_[k]);
     const Eigen::Vector3d& t_host = frames_.body(point.host).t_world_body;
     // The host's derivatives are carry(host) times these sums over all measurements.
     Eigen::Matrix3d host_hessian = Eigen::Matrix3d::Zero();
@@ -314,7 +263,7 @@ class SchurSolver {
     const auto go = [&](double share) {
       // Nothing lies beyond infinity.
       point.inverse_depth = std::max(0.0, start + share * point_step_[k]);
-      return point_cost_[k] = cost_of(point);
+      return point_cost_[k] = cost_of(k);
     };
     const double all_the_way = go(1.0);
     if (all_the_way <= before || point_step_[k] == 0.0) return all_the_way;
@@ -331,6 +280,7 @@ class SchurSolver {
   BlockMatrix hessian_, reduced_;
   Eigen::MatrixXd dense_;
   Eigen::VectorXd gradient_, reduced_gradient_, pose_step_;
+  std::vector<Eigen::Vector3d> bearing_body_;  // of each point, in its host's body axes
   std::vector<PointBlock> blocks_;
   std::vector<Coupling> couplings_;  // grouped by point
   std::vector<double> point_step_, point_cost_, saved_point_cost_;

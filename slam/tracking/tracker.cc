@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "slam/geometry/pnp.h"
 
@@ -23,6 +24,9 @@ bool scale_fits(float change) {
 Tracker::Tracker(const EstimatorConfig& config) : config_(config) {
   counts_.resize(static_cast<std::size_t>(config.capacity.landmarks));
   counted_slots_.reserve(counts_.size());
+  view_index_of_slot_.assign(counts_.size(), 0);
+  for (int l = 0; l < config.pyramid.levels; ++l)
+    level_scale_.push_back(std::pow(config.pyramid.scale_factor, l));
 }
 
 void Tracker::set_view(std::shared_ptr<const LocalView> view) {
@@ -38,12 +42,12 @@ void Tracker::set_view(std::shared_ptr<const LocalView> view) {
   }
   view_ = std::move(view);
   seen_last_frame_.assign(view_->landmarks.size(), 0);
-  std::vector<std::uint32_t> index_of_slot(counts_.size(), 0xFFFFFFFFU);
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i)
-    index_of_slot[view_->landmarks[i].handle.index] = static_cast<std::uint32_t>(i);
+    view_index_of_slot_[view_->landmarks[i].handle.index] = static_cast<std::uint32_t>(i);
   for (const LandmarkHandle& h : last_seen_) {
-    const std::uint32_t i = index_of_slot[h.index];
-    if (i != 0xFFFFFFFFU && view_->landmarks[i].handle == h) seen_last_frame_[i] = 1;
+    // What an older view left there names another landmark, or none.
+    const std::uint32_t i = view_index_of_slot_[h.index];
+    if (i < view_->landmarks.size() && view_->landmarks[i].handle == h) seen_last_frame_[i] = 1;
   }
 }
 
@@ -66,16 +70,17 @@ SE3 Tracker::predict_pose(std::int64_t utime) const {
   return T_world_body_.boxplus(velocity_ * dt_s);
 }
 
-void Tracker::project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const {
+void Tracker::project_view(const Frame& frame, const SE3& T_world_body, Among among,
+                           std::vector<Candidate>* out) const {
+  const StageSpan span(listener_, Stage::kMatching);
   out->clear();
   const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
-  const SE3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
+  const Predictor predictor(camera.camera, (T_world_body * camera.T_body_camera).inverse());
+  Candidate c;
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
+    if (among == Among::kLastFrame && seen_last_frame_[i] == 0) continue;
     const ViewLandmark& l = view_->landmarks[i];
-    Candidate c;
-    if (!predict({l.point_w, l.anchor_w, l.d_point_d_pixel}, camera.camera, T_camera_world, kBorderPx,
-                 &c.prediction))
-      continue;
+    if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &c.prediction)) continue;
     if (c.prediction.view_cosine < kMinViewCosine || !scale_fits(c.prediction.scale_change)) continue;
     c.view_index = static_cast<std::uint32_t>(i);
     c.level = predicted_level(l.host_level, c.prediction.scale_change,
@@ -85,15 +90,14 @@ void Tracker::project_view(const Frame& frame, const SE3& T_world_body, std::vec
 }
 
 int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px,
-                              float ratio, bool last_frame_only) {
-  const double scale_factor = config_.pyramid.scale_factor;
+                              float ratio) {
+  const StageSpan span(listener_, Stage::kMatching);
   int found = 0;
-  std::vector<std::uint8_t> matched(view_->landmarks.size(), 0);
-  for (const Match& m : matches_) matched[m.view_index] = 1;
+  matched_.assign(view_->landmarks.size(), 0);
+  for (const Match& m : matches_) matched_[m.view_index] = 1;
   for (const Candidate& c : candidates) {
     const ViewLandmark& l = view_->landmarks[c.view_index];
-    if (matched[c.view_index] != 0) continue;
-    if (last_frame_only && seen_last_frame_[c.view_index] == 0) continue;
+    if (matched_[c.view_index] != 0) continue;
     // What the depth leaves open widens the window.
     const double depth_px =
         std::min(20.0, 2.0 * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
@@ -101,7 +105,7 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
     q.descriptor = l.descriptor;
     q.u_px = static_cast<float>(c.prediction.pixel.x());
     q.v_px = static_cast<float>(c.prediction.pixel.y());
-    q.radius_px = static_cast<float>(radius_px * std::pow(scale_factor, c.level) + depth_px);
+    q.radius_px = static_cast<float>(radius_px * level_scale_[static_cast<std::size_t>(c.level)] + depth_px);
     q.min_level = c.level - 1;
     q.max_level = c.level + 1;
     q.max_hamming = config_.tracking.max_hamming;
@@ -114,7 +118,7 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
     m.view_index = c.view_index;
     m.feature = feature;
     m.pixel = {f.u_px, f.v_px};
-    m.sigma_px = static_cast<float>(std::pow(scale_factor, f.level));
+    m.sigma_px = static_cast<float>(level_scale_[f.level]);
     m.inlier = true;
     feature_match_[static_cast<std::size_t>(feature)] = static_cast<std::int32_t>(matches_.size());
     matches_.push_back(m);
@@ -125,17 +129,19 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
 
 void Tracker::align_matches(const Frame& frame, const std::vector<Candidate>& candidates) {
   if (!frame.image) return;
-  const double scale_factor = config_.pyramid.scale_factor;
-  std::vector<const Candidate*> of_view(view_->landmarks.size(), nullptr);
-  for (const Candidate& c : candidates) of_view[c.view_index] = &c;
+  const StageSpan span(listener_, Stage::kAlignment);
+  candidate_of_.assign(view_->landmarks.size(), -1);
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    candidate_of_[candidates[i].view_index] = static_cast<std::int32_t>(i);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < matches_.size(); ++i) {
     Match m = matches_[i];
-    const Candidate* c = of_view[m.view_index];
-    if (c == nullptr) continue;
+    const std::int32_t index = candidate_of_[m.view_index];
+    if (index < 0) continue;
+    const Candidate& c = candidates[static_cast<std::size_t>(index)];
     const Feature& f = frame.set.features[static_cast<std::size_t>(m.feature)];
-    const auto level_scale = static_cast<float>(std::pow(scale_factor, f.level));
-    const Alignment a = frame.image->align(view_->landmarks[m.view_index].patch, c->prediction.A_target_host,
+    const auto level_scale = static_cast<float>(level_scale_[f.level]);
+    const Alignment a = frame.image->align(view_->landmarks[m.view_index].patch, c.prediction.A_target_host,
                                            {f.u_px, f.v_px}, 2.0F * level_scale);
     if (a.ok) {
       m.pixel = a.pixel;
@@ -150,6 +156,7 @@ void Tracker::align_matches(const Frame& frame, const std::vector<Candidate>& ca
 }
 
 PoseSolution Tracker::pose_from_matches(const Frame& frame, const SE3& start) {
+  const StageSpan span(listener_, Stage::kPose);
   measurements_.clear();
   for (const Match& m : matches_) {
     const ViewLandmark& l = view_->landmarks[m.view_index];
@@ -170,19 +177,22 @@ PoseSolution Tracker::pose_from_matches(const Frame& frame, const SE3& start) {
 // First pose: the landmarks of the last frame near where the prior expects them, then further away, then the
 // whole view.
 bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
-  project_view(frame, *T_world_body, &candidates_);
   const double base = config_.tracking.prior_search_px;
   struct Attempt {
     double radius_px;
-    bool last_frame_only;
+    Among among;
   };
-  const Attempt attempts[] = {{base, true}, {2.0 * base, true}, {2.0 * base, false}, {4.0 * base, false}};
+  const Attempt attempts[] = {{base, Among::kLastFrame},
+                              {2.0 * base, Among::kLastFrame},
+                              {2.0 * base, Among::kAll},
+                              {4.0 * base, Among::kAll}};
+  std::optional<Among> projected;
   for (const Attempt& a : attempts) {
+    if (projected != a.among) project_view(frame, *T_world_body, a.among, &candidates_);
+    projected = a.among;
     matches_.clear();
     std::fill(feature_match_.begin(), feature_match_.end(), -1);
-    if (match_candidates(frame, candidates_, a.radius_px, 0.9F, a.last_frame_only) <
-        config_.tracking.min_matches)
-      continue;
+    if (match_candidates(frame, candidates_, a.radius_px, 0.9F) < config_.tracking.min_matches) continue;
     const PoseSolution s = pose_from_matches(frame, *T_world_body);
     // Half of what was matched must agree: a pose that explains a fifth of the matches explains nothing.
     if (s.inliers >= config_.tracking.min_matches / 2 && 2 * s.inliers >= static_cast<int>(matches_.size()) &&
@@ -209,9 +219,9 @@ TrackOutcome Tracker::fine_pose(const Frame& frame, const SE3& start) {
   for (std::size_t i = 0; i < kept; ++i)
     feature_match_[static_cast<std::size_t>(matches_[i].feature)] = static_cast<std::int32_t>(i);
 
-  project_view(frame, start, &candidates_);
+  project_view(frame, start, Among::kAll, &candidates_);
   out.expected = static_cast<int>(candidates_.size());
-  match_candidates(frame, candidates_, config_.tracking.local_search_px, 0.8F, false);
+  match_candidates(frame, candidates_, config_.tracking.local_search_px, 0.8F);
   align_matches(frame, candidates_);
   out.matches = static_cast<int>(matches_.size());
   if (out.matches < config_.tracking.min_matches / 2) return out;

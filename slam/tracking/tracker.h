@@ -8,6 +8,7 @@
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/predict.h"
+#include "slam/stages.h"
 #include "slam/tracking/pose_solver.h"
 
 namespace farpoint::slam {
@@ -37,6 +38,7 @@ struct TrackOutcome {
 class Tracker {
  public:
   explicit Tracker(const EstimatorConfig& config);
+  void listen(StageListener* listener) { listener_ = listener; }
 
   // Takes a newer view. Pose and motion prior move with the reference keyframe's correction.
   void set_view(std::shared_ptr<const LocalView> view);
@@ -70,12 +72,15 @@ class Tracker {
     Prediction prediction;
     int level = 0;
   };
+  // Which of the view's landmarks are looked for.
+  enum class Among : std::uint8_t { kLastFrame, kAll };
 
   [[nodiscard]] SE3 predict_pose(std::int64_t utime) const;
-  void project_view(const Frame& frame, const SE3& T_world_body, std::vector<Candidate>* out) const;
+  void project_view(const Frame& frame, const SE3& T_world_body, Among among,
+                    std::vector<Candidate>* out) const;
   bool coarse_pose(const Frame& frame, SE3* T_world_body);
   int match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px,
-                       float ratio, bool last_frame_only);
+                       float ratio);
   void align_matches(const Frame& frame, const std::vector<Candidate>& candidates);
   PoseSolution pose_from_matches(const Frame& frame, const SE3& start);
   TrackOutcome fine_pose(const Frame& frame, const SE3& start);
@@ -83,12 +88,15 @@ class Tracker {
   [[nodiscard]] double motion_since_reference(const Frame& frame, const SE3& T_world_body) const;
 
   const EstimatorConfig config_;
+  StageListener* listener_ = nullptr;
   std::shared_ptr<const LocalView> view_;
 
   SE3 T_world_body_;
   std::int64_t utime_ = 0;
   Vector6d velocity_ = Vector6d::Zero();
   bool has_velocity_ = false;
+
+  std::vector<double> level_scale_;  // of each pyramid level
 
   // Work space, reused.
   std::vector<Candidate> candidates_;
@@ -97,7 +105,11 @@ class Tracker {
   std::vector<PoseMeasurement> measurements_;
   std::vector<LandmarkHandle> last_seen_;      // inliers of the last accepted frame
   std::vector<std::uint8_t> seen_last_frame_;  // one a view landmark
-  std::vector<SightingCount> counts_;          // one a landmark slot of the map
+  std::vector<std::uint8_t> matched_;          // one a view landmark
+  std::vector<std::int32_t> candidate_of_;     // one a view landmark: index in candidates_, or -1
+  std::vector<std::uint32_t>
+      view_index_of_slot_;             // one a landmark slot of the map; valid where the view says so
+  std::vector<SightingCount> counts_;  // one a landmark slot of the map
   std::vector<std::uint32_t> counted_slots_;
 };
 

@@ -6,12 +6,15 @@
 #include <time.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 
 #include "slam/image/extractor.h"
 #include "slam/image/kernels.h"
+#include "slam/mapping/epipolar_index.h"
 #include "tests/image/test_images.h"
 
 namespace farpoint::slam {
@@ -126,12 +129,75 @@ void align_1000(benchmark::State& state) {
   state.counters["alignments"] = static_cast<double>(patches.size());
 }
 
+// The descriptors of a frame, each against 64 of the next one's, as matching asks.
+void hamming_2000x64(benchmark::State& state, const char* target) {
+  if (!pin_kernels(target)) {
+    state.SkipWithError("this machine lacks the instruction set");
+    return;
+  }
+  Pipeline a, b;
+  const auto extract = [](Pipeline* p, const OwnedImage& frame) {
+    p->pyramid.build(frame.view());
+    p->extractor.extract(p->pyramid, {}, &p->set);
+  };
+  extract(&a, frames()[0]);
+  extract(&b, frames()[1]);
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t i = 0; i < 64; ++i)
+    indices.push_back((i * 31) % static_cast<std::uint32_t>(b.set.features.size()));
+  std::array<std::uint16_t, 64> distances{};
+  run(state, [&](const OwnedImage&) {
+    for (const Descriptor& d : a.set.descriptors) {
+      active_kernels().hamming(d.words.data(), b.set.descriptors.front().words.data(), indices.data(), 64,
+                               distances.data());
+      benchmark::DoNotOptimize(distances.data());
+    }
+  });
+  pin_kernels("auto");
+}
+
+// Every feature of a frame searched along a line of the image through the next frame: what mapping does with
+// each neighbour of a keyframe.
+void epipolar_2000(benchmark::State& state) {
+  Pipeline a, b;
+  a.pyramid.build(frames()[0].view());
+  a.extractor.extract(a.pyramid, {}, &a.set);
+  b.pyramid.build(frames()[1].view());
+  b.extractor.extract(b.pyramid, {}, &b.set);
+  const std::vector<std::uint8_t> wanted(b.set.features.size(), 1);
+  const Eigen::Vector2d epipole(frames()[0].width / 2.0, frames()[0].height / 2.0);
+  EpipolarIndex index;
+  int found = 0;
+  run(state, [&](const OwnedImage& frame) {
+    found = 0;
+    index.build(b.set, wanted, frame.width, frame.height);
+    for (std::size_t i = 0; i < a.set.features.size(); ++i) {
+      const Feature& f = a.set.features[i];
+      EpipolarQuery q;
+      q.from_px = Eigen::Vector2d(f.u_px, f.v_px);
+      q.to_px = q.from_px + 0.5 * (q.from_px - epipole);
+      q.half_width_px = 3.0F * std::pow(1.2F, static_cast<float>(f.level));
+      q.min_level = f.level - 3;
+      q.max_level = f.level + 3;
+      q.angle_rad = f.angle_rad;
+      q.max_turn_rad = 0.6F;
+      q.descriptor = &a.set.descriptors[i];
+      q.ratio = 0.85F;
+      found += index.find(b.set, q).feature >= 0 ? 1 : 0;
+    }
+  });
+  state.counters["found"] = found;
+}
+
 BENCHMARK(cv_orb)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pyramid_and_extract, auto, "auto") -> Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pyramid_and_extract, SSE4, "SSE4")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pyramid_and_extract, plain, "plain")->Unit(benchmark::kMillisecond);
 BENCHMARK(pyramid_only)->Unit(benchmark::kMillisecond);
 BENCHMARK(align_1000)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(hamming_2000x64, auto, "auto") -> Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(hamming_2000x64, plain, "plain")->Unit(benchmark::kMillisecond);
+BENCHMARK(epipolar_2000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace farpoint::slam

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "slam/image/descriptor_pattern.h"
 #include "tests/image/test_images.h"
@@ -272,6 +273,192 @@ TEST(Kernels, MaximaAreNeitherDoubledNorLost) {
     }
   }
   EXPECT_GT(survivors, 100);
+}
+
+float uniform(std::mt19937_64& rng, float low, float high) {
+  return std::uniform_real_distribution<float>(low, high)(rng);
+}
+
+TEST(Kernels, HammingDistancesAreExact) {
+  std::mt19937_64 rng(31);
+  constexpr std::size_t kDescriptors = 100;
+  std::vector<Descriptor> descriptors(kDescriptors);
+  for (Descriptor& d : descriptors)
+    for (std::uint64_t& word : d.words) word = rng();
+  descriptors[3].words = {};
+  descriptors[4].words.fill(~std::uint64_t{0});
+  std::vector<std::uint32_t> indices{3, 4};
+  while (indices.size() < 67) indices.push_back(static_cast<std::uint32_t>(rng() % kDescriptors));
+  for (const std::size_t query : {std::size_t{0}, std::size_t{3}, std::size_t{4}}) {
+    const auto check = [&](const Kernels& kernels) {
+      for (const std::size_t count : {std::size_t{0}, std::size_t{1}, indices.size()}) {
+        std::vector<std::uint16_t> distances(indices.size() + 1, 999);
+        kernels.hamming(descriptors[query].words.data(), descriptors[0].words.data(), indices.data(),
+                        static_cast<int>(count), distances.data());
+        for (std::size_t i = 0; i < count; ++i)
+          EXPECT_EQ(distances[i], hamming_distance(descriptors[query], descriptors[indices[i]]));
+        EXPECT_EQ(distances[count], 999) << "nothing is written behind the end";
+      }
+    };
+    for_each_target(check);
+    check(plain_kernels());
+  }
+  std::uint16_t opposite = 0;
+  const std::uint32_t other = 4;
+  plain_kernels().hamming(descriptors[3].words.data(), descriptors[0].words.data(), &other, 1, &opposite);
+  EXPECT_EQ(opposite, 256);
+}
+
+TEST(Kernels, BandSelectionIsIdenticalAndRight) {
+  std::mt19937_64 rng(37);
+  constexpr std::size_t kPoints = 500;
+  std::vector<float> u, v, angle, level;
+  for (std::size_t i = 0; i < kPoints + kRowAlignment; ++i) {
+    u.push_back(uniform(rng, 0, 200));
+    v.push_back(uniform(rng, 0, 100));
+    angle.push_back(uniform(rng, -3.1415F, 3.1415F));
+    level.push_back(static_cast<float>(rng() % 8));
+  }
+  const PointArrays points{u.data(), v.data(), angle.data(), level.data()};
+  std::size_t selected = 0;
+  for (int trial = 0; trial < 800; ++trial) {
+    Band band;
+    const float direction = uniform(rng, -3.1415F, 3.1415F);
+    band.u_px = uniform(rng, 0, 200);
+    band.v_px = uniform(rng, 0, 100);
+    band.along_u = std::cos(direction);
+    band.along_v = std::sin(direction);
+    band.length_px = uniform(rng, 0, 150);
+    band.half_width_px = uniform(rng, 1, 20);
+    band.min_level = static_cast<float>(rng() % 4);
+    band.max_level = band.min_level + 3;
+    band.angle_rad = uniform(rng, -3.1415F, 3.1415F);
+    band.max_turn_rad = 1.0F;
+    const int begin = static_cast<int>(rng() % 50), end = begin + static_cast<int>(rng() % 400);
+    std::vector<std::uint32_t> expected(kPoints), actual(kPoints);
+    const int count = plain_kernels().select_in_band(points, begin, end, band, expected.data());
+    expected.resize(static_cast<std::size_t>(count));
+    for_each_target([&](const Kernels& kernels) {
+      actual.assign(kPoints, 0);
+      const int n = kernels.select_in_band(points, begin, end, band, actual.data());
+      actual.resize(static_cast<std::size_t>(n));
+      EXPECT_EQ(actual, expected);
+    });
+    selected += expected.size();
+    // Against the definition, where rounding cannot decide otherwise.
+    for (int i = begin; i < end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double x = u[k] - band.u_px, y = v[k] - band.v_px;
+      const double along = x * std::cos(double{direction}) + y * std::sin(double{direction});
+      const double across = std::abs(y * std::cos(double{direction}) - x * std::sin(double{direction}));
+      const double turn = std::abs(std::remainder(double{angle[k]} - double{band.angle_rad}, 6.283185307));
+      const double worst = std::max({across - double{band.half_width_px}, -along - double{band.half_width_px},
+                                     along - double{band.length_px} - double{band.half_width_px},
+                                     turn - double{band.max_turn_rad}});
+      if (std::abs(worst) < 1e-3) continue;
+      const bool inside = worst < 0 && level[k] >= band.min_level && level[k] <= band.max_level;
+      EXPECT_EQ(std::count(expected.begin(), expected.end(), static_cast<std::uint32_t>(i)), inside ? 1 : 0);
+    }
+  }
+  EXPECT_GT(selected, 1000U);
+}
+
+TEST(Kernels, SmoothedPatchesAreBitIdentical) {
+  std::mt19937_64 rng(41);
+  std::array<std::uint8_t, kAlignPatchSide * kAlignPatchSide> patch{};
+  for (std::uint8_t& p : patch) p = static_cast<std::uint8_t>(rng());
+  std::array<float, patch.size()> expected{}, actual{};
+  plain_kernels().smooth_patch(patch.data(), expected.data());
+  for_each_target([&](const Kernels& kernels) {
+    kernels.smooth_patch(patch.data(), actual.data());
+    EXPECT_EQ(actual, expected);
+  });
+  patch.fill(200);
+  simd_kernels().smooth_patch(patch.data(), actual.data());
+  for (const float v : actual) EXPECT_EQ(v, 200.0F);
+}
+
+TEST(Kernels, SampledPatchesAreBitIdenticalAndFollowAPlane) {
+  std::mt19937_64 rng(43);
+  std::array<float, kAlignPatchSide * kAlignPatchSide> noise{}, plane{};
+  for (int y = 0; y < kAlignPatchSide; ++y)
+    for (int x = 0; x < kAlignPatchSide; ++x) {
+      noise[static_cast<std::size_t>(y * kAlignPatchSide + x)] = uniform(rng, 0, 255);
+      plane[static_cast<std::size_t>(y * kAlignPatchSide + x)] = static_cast<float>(10 + 3 * x - 2 * y);
+    }
+  for (int trial = 0; trial < 50; ++trial) {
+    PatchSampling s;
+    s.xi = uniform(rng, 0.5F, 1.2F);
+    s.yj = uniform(rng, 0.5F, 1.2F);
+    s.xj = uniform(rng, -0.4F, 0.4F);
+    s.yi = uniform(rng, -0.4F, 0.4F);
+    s.x0 = 8 - 3.5F * (s.xi + s.xj);
+    s.y0 = 8 - 3.5F * (s.yi + s.yj);
+    s.share = 0.25F;
+    PatchTemplate expected{}, on_plane{};
+    plain_kernels().sample_patch(noise.data(), s, &expected);
+    plain_kernels().sample_patch(noise.data(), s, &expected);  // adds
+    for_each_target([&](const Kernels& kernels) {
+      PatchTemplate actual{};
+      kernels.sample_patch(noise.data(), s, &actual);
+      kernels.sample_patch(noise.data(), s, &actual);
+      EXPECT_TRUE(std::equal(expected.value, expected.value + kTemplateCount, actual.value));
+      EXPECT_TRUE(std::equal(expected.dx, expected.dx + kTemplateCount, actual.dx));
+      EXPECT_TRUE(std::equal(expected.dy, expected.dy + kTemplateCount, actual.dy));
+    });
+    s.share = 1;
+    simd_kernels().sample_patch(plane.data(), s, &on_plane);
+    for (int at = 0; at < kTemplateCount; ++at) {
+      const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
+      const float x = s.x0 + s.xi * i + s.xj * j, y = s.y0 + s.yi * i + s.yj * j;
+      EXPECT_NEAR(on_plane.value[at], 10 + 3 * x - 2 * y, 1e-3F);
+      EXPECT_NEAR(on_plane.dx[at], 3 * s.xi - 2 * s.yi, 1e-4F);
+      EXPECT_NEAR(on_plane.dy[at], 3 * s.xj - 2 * s.yj, 1e-4F);
+    }
+  }
+}
+
+TEST(Kernels, WindowSumsAreBitIdenticalAndRight) {
+  std::mt19937_64 rng(47);
+  const OwnedImage image = testing::random_image(331, 64, 5);
+  for (int trial = 0; trial < 50; ++trial) {
+    PatchTemplate with{};
+    for (int at = 0; at < kTemplateCount; ++at) {
+      with.value[at] = uniform(rng, -1, 1);
+      with.dx[at] = uniform(rng, -1, 1);
+      with.dy[at] = uniform(rng, -1, 1);
+    }
+    float wx[5], wy[5];
+    for (int k = 0; k < 5; ++k) wx[k] = uniform(rng, 0, 0.4F), wy[k] = uniform(rng, 0, 0.4F);
+    const int x = static_cast<int>(rng() % 319), y = static_cast<int>(rng() % 52);
+    const std::uint8_t* corner = image.pixels.data() + y * image.width + x;
+    const WindowSums expected = plain_kernels().window_sums(corner, image.width, wx, wy, with);
+    for_each_target([&](const Kernels& kernels) {
+      const WindowSums actual = kernels.window_sums(corner, image.width, wx, wy, with);
+      EXPECT_EQ(actual.value, expected.value);
+      EXPECT_EQ(actual.square, expected.square);
+      EXPECT_EQ(actual.along, expected.along);
+      EXPECT_EQ(actual.dx, expected.dx);
+      EXPECT_EQ(actual.dy, expected.dy);
+    });
+    double window[kTemplateCount], sum = 0, square = 0, along = 0;
+    for (int at = 0; at < kTemplateCount; ++at) {
+      window[at] = 0;
+      for (int j = 0; j < 5; ++j)
+        for (int i = 0; i < 5; ++i)
+          window[at] += double{wx[i]} * double{wy[j]} *
+                        image.at(x + at % kTemplateSide + i, y + at / kTemplateSide + j);
+    }
+    for (int at = 0; at < kTemplateCount; ++at) {
+      const double value = window[at] - window[kTemplateCount / 2];
+      sum += value;
+      square += value * value;
+      along += value * double{with.value[at]};
+    }
+    EXPECT_NEAR(expected.value, sum, 1e-5 * (1 + std::sqrt(square)) * 8);
+    EXPECT_NEAR(expected.square, square, 1e-4 * (1 + square));
+    EXPECT_NEAR(expected.along, along, 1e-5 * (1 + std::sqrt(square)) * 8);
+  }
 }
 
 }  // namespace

@@ -24,12 +24,16 @@ ALLOWED = {
     "ipc": {"types"},
     "drivers": {"ipc", "types"},
     "daemon": {"slam", "ipc", "drivers", "types", "build"},
-    "tools": {"slam", "slam/geometry", "slam/image", "ipc", "drivers", "types"},
+    "tools": {"slam", "slam/geometry", "slam/image", "ipc", "drivers", "types", "tools/bench"},
+    # Measures what the daemon runs, configured as the daemon is.
+    "tools/bench": {"slam", "ipc", "types", "daemon", "tools"},
 }
 # The options of all parts of the estimator: above image in the order, below map, so that the arrows stay one way.
 OPTIONS = "slam/config.h"
-OPTIONS_MAY_INCLUDE = {"slam/geometry", "slam/image"}
-OPTIONS_READERS = {"slam", "slam/map", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
+# The names of the stages that the parts announce to a listener.
+STAGES = "slam/stages.h"
+SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set()}
+SHARED_READERS = {"slam", "slam/map", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.
 FORBIDDEN_IN_SLAM = re.compile(
     r"<(iostream|fstream|filesystem|cstdio|stdio\.h|thread|mutex|shared_mutex|condition_variable|future|"
@@ -51,6 +55,8 @@ def folder_of(path: str) -> str:
     parts = path.split("/")
     if parts[0] == "slam":
         return "/".join(parts[:2]) if len(parts) > 2 else "slam"
+    if parts[:2] == ["tools", "bench"]:
+        return "tools/bench"
     if parts[0] in ("farpoint", "bot_core"):
         return "types"
     if path == "farpoint_build.h":
@@ -71,11 +77,12 @@ def include_problem(path: str, target: str):
     if "/" not in target and target != "farpoint_build.h":
         return f"{target}: includes start at the root of the repository"
     other = folder_of(target)
-    if path == OPTIONS:
-        folder, allowed = path, OPTIONS_MAY_INCLUDE
+    if path in SHARED_MAY_INCLUDE:
+        folder, allowed = path, SHARED_MAY_INCLUDE[path]
     else:
         allowed = ALLOWED[folder]
-    if other != folder and other not in allowed and not (target == OPTIONS and folder in OPTIONS_READERS):
+    shared = target in SHARED_MAY_INCLUDE and folder in SHARED_READERS
+    if other != folder and other not in allowed and not shared:
         return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'nothing but itself'}"
     return None
 

@@ -43,7 +43,7 @@ std::string unknown_command(const CLI::App& app, int argc, const char* const* ar
 int run_farpoint(int argc, const char* const* argv) {
   CLI::App app(
       "farpoint: bench tool of the Farpoint visual SLAM daemon.\n"
-      "Brings recordings into LCM logs that farpointd replays, and says how good a run was.",
+      "Brings recordings into LCM logs that farpointd replays, and says how good and how fast a run was.",
       "farpoint");
   app.require_subcommand(1);
   app.footer(
@@ -57,6 +57,7 @@ int run_farpoint(int argc, const char* const* argv) {
   add_import_command(&app, &action);
   add_export_command(&app, &action);
   add_evaluate_command(&app, &action);
+  add_bench_command(&app, &action);
   const std::string unknown = unknown_command(app, argc, argv);
   if (!unknown.empty()) return report(unknown, kExitMisused);
   try {

@@ -1,0 +1,70 @@
+// The stages of a frame's way, announced to whoever wants to measure them. The estimator has no clock: a
+// listener outside notes the time.
+#pragma once
+
+#include <cstdint>
+
+namespace farpoint::slam {
+
+enum class Stage : std::uint8_t {
+  kTracking,    // image to pose: all that the tracking thread does with a frame, keyframe hand-over included
+  kPyramid,     // of tracking
+  kExtraction,  // of tracking: corners and descriptors
+  kMatching,    // of tracking: local view projected, features found
+  kAlignment,   // of tracking: patches aligned to a fraction of a pixel
+  kPose,        // of tracking
+  kKeyframe,    // of tracking: decision and hand-over
+  kMapping,     // all that the mapping thread does with a keyframe
+  kTriangulation,  // of mapping: virtual map points and points
+  kFusing,         // of mapping: duplicates
+  kLocalBa,        // of mapping
+  kCalibration,    // of mapping: the camera refined from the map
+  kCulling,        // of mapping
+};
+
+class StageListener {
+ public:
+  // Stages nest, and may run several times in a frame. Called on the hot path: must neither wait nor
+  // allocate.
+  virtual void begin(Stage stage) = 0;
+  virtual void end(Stage stage) = 0;
+
+ protected:
+  ~StageListener() = default;
+};
+
+// A stage for as long as it lives. A null listener is nobody.
+class StageSpan {
+ public:
+  StageSpan(StageListener* listener, Stage stage) : listener_(listener), stage_(stage) {
+    if (listener_ != nullptr) listener_->begin(stage_);
+  }
+  ~StageSpan() {
+    if (listener_ != nullptr) listener_->end(stage_);
+  }
+  StageSpan(const StageSpan&) = delete;
+  StageSpan& operator=(const StageSpan&) = delete;
+
+ private:
+  StageListener* listener_;
+  Stage stage_;
+};
+
+// Takes a stretch out of a stage that is running around it: what one thread does in lockstep for another.
+class StagePause {
+ public:
+  StagePause(StageListener* listener, Stage stage) : listener_(listener), stage_(stage) {
+    if (listener_ != nullptr) listener_->end(stage_);
+  }
+  ~StagePause() {
+    if (listener_ != nullptr) listener_->begin(stage_);
+  }
+  StagePause(const StagePause&) = delete;
+  StagePause& operator=(const StagePause&) = delete;
+
+ private:
+  StageListener* listener_;
+  Stage stage_;
+};
+
+}  // namespace farpoint::slam

@@ -1,0 +1,86 @@
+#include "slam/mapping/calibrator.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/mapping/bundle_scene.h"
+
+namespace farpoint::slam {
+namespace {
+
+// A scene whose map believes in a camera that is wrong by `truth`, refined as mapping does it.
+class CalibratedScene {
+ public:
+  CalibratedScene(const CalibrationDelta& truth, std::uint64_t seed)
+      : scene_({.points = 800,
+                .rehosted_share = 0.0,
+                .noise_px = 0.2,
+                .start_m = 0.01,
+                .start_rad = 0.001,
+                .start_log_depth = 0.02,
+                .seed = seed}),
+        given_(refined_camera(scene_.rig.cameras[0].camera, -truth)),
+        calibrator_({}, given_) {
+    // Where the true camera saw what each landmark's host saw.
+    for (const auto& point : scene_.truth.points) {
+      Eigen::Vector2d pixel;
+      EXPECT_TRUE(scene_.rig.cameras[0].camera.project(point.bearing, &pixel));
+      host_pixels_.push_back(pixel);
+    }
+  }
+
+  // One keyframe's turn: local BA with the camera believed in, then the refinement. True where it moved.
+  bool turn() {
+    scene_.rig.cameras[0].camera = calibrator_.camera();
+    const Camera& camera = scene_.rig.cameras[0].camera;
+    std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(host_pixels_.size());
+    for (std::size_t i = 0; i < host_pixels_.size(); ++i) {
+      EXPECT_TRUE(camera.unproject(host_pixels_[i], &scene_.start.points[i].bearing));
+      for (int axis = 0; axis < 2; ++axis) {
+        const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
+        Eigen::Vector3d a, b;
+        EXPECT_TRUE(camera.unproject(host_pixels_[i] + half, &a) &&
+                    camera.unproject(host_pixels_[i] - half, &b));
+        d_bearing[i].col(axis) = a - b;
+      }
+    }
+    (void)solve_schur({.iterations = 20}, &scene_.start);
+    return calibrator_.update(scene_.start, d_bearing);
+  }
+
+  [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
+
+ private:
+  BundleScene scene_;
+  Camera given_;
+  Calibrator calibrator_;
+  std::vector<Eigen::Vector2d> host_pixels_;
+};
+
+TEST(Calibrator, FindsWhatIsWrongWithTheCamera) {
+  const CalibrationDelta truth(0.004, 1.5, -1.0, 0.01);
+  CalibratedScene scene(truth, 3);
+  EXPECT_TRUE(scene.turn()) << "a pixel of the centre is noticeable";
+  for (int i = 0; i < 7; ++i) scene.turn();
+  const CalibrationDelta error = scene.calibrator().delta() - truth, sigma = scene.calibrator().sigma();
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_LT(std::abs(error[i]), 4.0 * sigma[i]) << i;
+    EXPECT_LT(std::abs(error[i]), 0.4 * std::abs(truth[i])) << i << ": " << scene.calibrator().delta()[i];
+  }
+}
+
+TEST(Calibrator, LeavesARightCameraAlone) {
+  CalibratedScene scene(CalibrationDelta::Zero(), 4);
+  for (int i = 0; i < 4; ++i) scene.turn();
+  const CalibrationDelta sigma = scene.calibrator().sigma();
+  for (int i = 0; i < 4; ++i) EXPECT_LT(std::abs(scene.calibrator().delta()[i]), 4.0 * sigma[i]) << i;
+}
+
+TEST(Calibrator, AYoungWindowSaysNothing) {
+  CalibratedScene scene(CalibrationDelta(0.004, 1.5, -1.0, 0.01), 5);
+  Calibrator young({.min_keyframes = 100}, Camera(scene.calibrator().camera().parameters()));
+  EXPECT_EQ(young.delta(), CalibrationDelta::Zero());
+  EXPECT_TRUE(young.sigma().isApprox(CalibrationDelta(0.003, 2.0, 2.0, 0.02)));
+}
+
+}  // namespace
+}  // namespace farpoint::slam
