@@ -53,7 +53,7 @@ int run_checked(int argc, const char* const* argv) {
   const Config config = load_configuration(line.options);
   start_logging(config.log.level);
   make_libraries_single_threaded();
-  return replay_lockstep(line.options, config);
+  return replay(line.options, config);
 }
 
 }  // namespace

@@ -17,11 +17,17 @@ constexpr int kMinMatches = 80;
 // next to the reference gave, chance matches prevail.
 constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
-constexpr std::size_t kHistoryFrames = 60;
 
 }  // namespace
 
-Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {}
+Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {
+  history_.reserve(kHistoryFrames + 1);
+}
+
+void Initialiser::remember(std::shared_ptr<Frame> frame) {
+  history_.push_back(std::move(frame));
+  if (history_.size() > kHistoryFrames) history_.erase(history_.begin());
+}
 
 void Initialiser::clear() {
   history_.clear();
@@ -32,6 +38,9 @@ void Initialiser::clear() {
 void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   reference_ = std::move(frame);
   most_matches_ = 0;
+  // Older frames are never a reference again: their pixels go back to the pool.
+  for (const std::shared_ptr<Frame>& f : history_)
+    if (f->number < reference_->number) f->image.reset();
   expected_px_.clear();
   for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
@@ -114,8 +123,7 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
 }
 
 std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
-  history_.push_back(frame);
-  if (history_.size() > kHistoryFrames) history_.pop_front();
+  remember(frame);
   if (!reference_) {
     set_reference(frame);
     return {};
