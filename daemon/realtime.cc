@@ -20,11 +20,8 @@ void refused(const RealtimeConfig& config, const std::string& what) {
 
 void lock_memory(const RealtimeConfig& config) {
   if (!config.lock_memory) return;
-  // Freed memory stays with the process, and is not mapped anew for every large block: both would be page
-  // faults later. One arena for the threads that allocate (mapping, the main one) beside the first.
-  mallopt(M_TRIM_THRESHOLD, -1);
-  mallopt(M_MMAP_MAX, 0);
-  mallopt(M_ARENA_MAX, 2);
+  // Only mapping and the main thread allocate: one arena serves both, and a second would be locked whole.
+  mallopt(M_ARENA_MAX, 1);
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
     refused(config, std::string("memory is not locked: ") + std::strerror(errno) +
                         ", expected RLIMIT_MEMLOCK or CAP_IPC_LOCK to allow it");

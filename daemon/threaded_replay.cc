@@ -193,7 +193,8 @@ void ThreadedReplay::output() {
 }
 
 void ThreadedReplay::report_one(FramePackage* package) {
-  const double cpu_s = tracking_thread_->cpu_s();
+  // The last frames are reported after the thread has ended, and its clock with it.
+  const double cpu_s = std::max(tracking_thread_->cpu_s(), tracking_cpu_s_);
   const double cpu_ms = 1e3 * (cpu_s - tracking_cpu_s_);
   tracking_cpu_s_ = cpu_s;
   const double wall_ms = package->clock.wall_ms(timing_t::STAGE_TRACKING);

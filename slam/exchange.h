@@ -22,6 +22,7 @@ enum class MappingJobKind : std::uint8_t {
   kKeyframe,    // quick view, then full view
   kPoseFrames,  // frames from before the map; one reply without a view
   kDiscardMap,  // one reply without a view
+  kRetireMap,   // the same
 };
 
 struct MappingJob {

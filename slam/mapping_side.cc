@@ -43,6 +43,9 @@ bool MappingSide::step() {
     case MappingJobKind::kDiscardMap:
       discard_map(job->map_id);
       break;
+    case MappingJobKind::kRetireMap:
+      mapper_.retire_map(job->map_id);
+      break;
   }
   reply_->counts = mapper_.counts();
   reply_->keyframes = static_cast<std::uint32_t>(mapper_.map().keyframes().size());

@@ -16,9 +16,10 @@ constexpr int kRelocalisationFrames = 15;
 constexpr int kYoungMapKeyframes = 5;
 constexpr int kGridCell_px = 24;
 
-// Frames that are in somebody's hands at once: the initialiser's history, those that wait for a pose, here
-// and in a job; the pair of a new map, the frame being tracked and the next keyframe.
-constexpr std::size_t kFrames = 3 * Initialiser::kHistoryFrames + 8;
+// Frames that are in somebody's hands at once: the initialiser's history, or what became of it and waits for
+// a pose; as many in a job that poses them; the pair of a new map, the frame being tracked and the next
+// keyframe.
+constexpr std::size_t kFrames = 2 * Initialiser::kHistoryFrames + 8;
 
 std::shared_ptr<Frame> roomy_frame(const Camera& camera, const EstimatorConfig& config) {
   const auto features = static_cast<std::size_t>(config.extractor.features);
@@ -33,14 +34,17 @@ std::shared_ptr<Frame> roomy_frame(const Camera& camera, const EstimatorConfig& 
   return frame;
 }
 
-// Pyramids that are in somebody's hands at once: those of the keyframes that keep theirs, one more until the
-// oldest is let go and two of a new map; the initialiser's from its reference on; the frame being tracked,
-// the next keyframe, the pair of a new map.
+// Pyramids that are in somebody's hands at once. Either a map is being built: its keyframes that keep theirs,
+// one more until the oldest is let go, two that began it. Or one is being looked for: the initialiser's
+// reference and half of its frames since. Besides the frame being tracked, the next keyframe and the pair of
+// a new map; and those of a map that was given up, until mapping has let them go.
 std::size_t pyramid_count(const EstimatorConfig& config) {
-  const double searched =
-      std::min(config.initialisation.max_frames, static_cast<double>(Initialiser::kHistoryFrames));
-  return static_cast<std::size_t>(config.capacity.window_images) + 3 + static_cast<std::size_t>(searched) +
-         2 + 4;
+  constexpr std::size_t kInHand = 4, kOverlap = 4;
+  const double history = static_cast<double>(Initialiser::kHistoryFrames);
+  const auto looking =
+      static_cast<std::size_t>(std::min(0.5 * config.initialisation.max_frames, history)) + 3;
+  const std::size_t building = static_cast<std::size_t>(config.capacity.window_images) + 3;
+  return std::max(looking, building) + kInHand + kOverlap;
 }
 
 }  // namespace
@@ -328,8 +332,8 @@ void TrackingSide::lose(const std::shared_ptr<Frame>& frame) {
   state_ = lost_frames_ == 1 ? State::kLost : State::kRelocalising;
   if (!young && lost_frames_ <= kRelocalisationFrames) return;
   // Begin anew, beside the old map where that is worth keeping. Where mapping cannot take the job now, the
-  // young map stays too.
-  if (young && begin_job(MappingJobKind::kDiscardMap) != nullptr) end_job();
+  // old map stays as it is.
+  if (begin_job(young ? MappingJobKind::kDiscardMap : MappingJobKind::kRetireMap) != nullptr) end_job();
   first_job_of_map_ = jobs_ + 1;
   busy_until_frame_ = 0;
   waiting_.clear();

@@ -20,8 +20,8 @@ constexpr int kTrustedRun = 10;
 // Keyframes of a view: the reference, its neighbours, and theirs.
 constexpr std::size_t kViewNeighbours = 30, kViewSecondRing = 10, kViewSecondNeighbours = 5;
 // Views in somebody's hands at once: the one tracking has, a quick and a full one on their way to it, one
-// that frames are posed against, and the one being made; one to spare.
-constexpr std::size_t kViews = 6;
+// that frames are posed against, and the one being made.
+constexpr std::size_t kViews = 5;
 
 std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
   auto view = std::make_shared<LocalView>();
@@ -487,6 +487,12 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
     map_.remove_keyframe(h);
     ++counts_.keyframes_culled;
   }
+}
+
+void Mapper::retire_map(std::int32_t map_id) {
+  map_.keyframes().for_each([map_id](KeyframeHandle, Keyframe& k) {
+    if (k.map_id == map_id) k.image.reset();
+  });
 }
 
 void Mapper::limit_memory(KeyframeHandle newest) {

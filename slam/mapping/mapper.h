@@ -38,6 +38,8 @@ class Mapper {
   [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
   [[nodiscard]] std::uint64_t newest_id() const { return newest_id_; }
   void discard_map(std::int32_t map_id) { map_.discard_map(map_id); }
+  // The map is kept, but not built on any more: its keyframes give back their pixels.
+  void retire_map(std::int32_t map_id);
   [[nodiscard]] std::size_t view_bytes() const;
 
  private:

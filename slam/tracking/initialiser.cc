@@ -38,11 +38,16 @@ void Initialiser::clear() {
 void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   reference_ = std::move(frame);
   most_matches_ = 0;
-  // Older frames are never a reference again: their pixels go back to the pool.
-  for (const std::shared_ptr<Frame>& f : history_)
-    if (f->number < reference_->number) f->image.reset();
   expected_px_.clear();
   for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
+}
+
+// Only the frame half way between the reference and now can be the next reference. What is older never can
+// again: those pixels go back to the pool.
+void Initialiser::forget_pixels(std::uint64_t age) {
+  const std::uint64_t half = reference_->number + (age + 1) / 2;
+  for (const std::shared_ptr<Frame>& f : history_)
+    if (f->number < half && f != reference_) f->image.reset();
 }
 
 void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
@@ -132,6 +137,7 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
   last_matches_ = static_cast<int>(pairs_.size());
   const auto age = frame->number - reference_->number;
   most_matches_ = std::max(most_matches_, last_matches_);
+  forget_pixels(age);
   const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * most_matches_));
   if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
     // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,

@@ -32,6 +32,7 @@ class Initialiser {
     std::size_t feature_first = 0, feature_second = 0;
   };
   void set_reference(std::shared_ptr<Frame> frame);
+  void forget_pixels(std::uint64_t age);
   void match(const Frame& frame, std::vector<Pairing>* out);
   std::optional<InitialPair> solve(const std::shared_ptr<Frame>& frame,
                                    const std::vector<Pairing>& pairs) const;
