@@ -67,9 +67,8 @@ ipc::OdometryEpoch make_epoch(const FrameOutput& frame, CanPoseFrame pose_frame,
 }
 
 void CanSink::on_frame(const FrameOutput& frame) {
-  // Lockstep has no clock: what is published of a frame is published at its utime.
-  constexpr double kAge_s = 0.0;
-  const ipc::CanEpoch frames = encoder_.encode(make_epoch(frame, pose_frame_, kAge_s));
+  const double age_s = 1e-6 * static_cast<double>(frame.age_us);
+  const ipc::CanEpoch frames = encoder_.encode(make_epoch(frame, pose_frame_, age_s));
   if (bus_) bus_->send(frames);
   if (!log_) return;
   if (frame.result.utime >= 0) {

@@ -44,12 +44,22 @@ struct CanConfig {
   CanPoseFrame frame = CanPoseFrame::kMap;
 };
 
+// Threaded runs.
+struct RealtimeConfig {
+  bool lock_memory = true;
+  int stack_kb = 512;         // of each thread
+  int capture_queue = 2;      // images that may wait for tracking
+  int tracking_priority = 0;  // SCHED_FIFO; 0: ordinary
+  bool require = false;       // leave where the system refuses
+};
+
 struct Config {
   LogConfig log;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;
   CanConfig can;
+  RealtimeConfig realtime;
   slam::EstimatorConfig estimator;
 };
 

@@ -97,6 +97,12 @@ std::vector<ConfigKey> make_keys() {
       text("can.interface", FIELD(can.interface)),
       enumeration("can.frame", {"map", "odom"}, FIELD(can.frame)),
 
+      boolean("realtime.lock_memory", FIELD(realtime.lock_memory)),
+      integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),
+      integer("realtime.capture_queue", "images", 1, 100, FIELD(realtime.capture_queue)),
+      integer("realtime.tracking_priority", "", 0, 90, FIELD(realtime.tracking_priority)),
+      boolean("realtime.require", FIELD(realtime.require)),
+
       integer("pyramid.levels", "levels", 1, 16, FIELD(estimator.pyramid.levels)),
       number("pyramid.scale_factor", "", 1.05, 2, FIELD(estimator.pyramid.scale_factor)),
 
@@ -111,6 +117,7 @@ std::vector<ConfigKey> make_keys() {
       integer("capacity.observations_per_landmark", "observations", 4, 1000,
               FIELD(estimator.capacity.observations_per_landmark)),
       integer("capacity.window_images", "images", 2, 1000, FIELD(estimator.capacity.window_images)),
+      integer("capacity.view_landmarks", "landmarks", 500, 1000000, FIELD(estimator.capacity.view_landmarks)),
 
       number("initialisation.min_parallax_rad", "rad", 1e-4, 1,
              FIELD(estimator.initialisation.min_parallax_rad)),

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <string>
 
-#include "daemon/session.h"
+#include "daemon/counts.h"
+#include "daemon/stage_clock.h"
 #include "ipc/image_codec.h"
 #include "ipc/message.h"
+#include "slam/estimator.h"
 
 namespace farpoint::daemon {
 
@@ -15,6 +17,10 @@ struct SourceFrame {
   std::int64_t utime = 0;  // mid-exposure, microseconds
   std::int64_t sequence = 0;
   const ipc::GreyImage* image = nullptr;
+
+  [[nodiscard]] slam::ImageView view() const {
+    return {image->data(), image->width_px, image->height_px, image->width_px};
+  }
 };
 
 class FrameSource {
@@ -25,6 +31,8 @@ class FrameSource {
   // `clock` gets the time of decoding. Throws InputError where what is needed is not there,
   // std::runtime_error where reading fails.
   [[nodiscard]] virtual bool next(SourceFrame* frame, StageClock* clock) = 0;
+  // Gives the image that next() gave last in exchange for another, without copying it.
+  virtual void swap_image(ipc::GreyImage* image) = 0;
   // Known once next() has given the first image.
   [[nodiscard]] virtual const calibration_t& calibration() const = 0;
   [[nodiscard]] virtual InputCounts counts() const = 0;

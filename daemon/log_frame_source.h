@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/frame_source.h"
 #include "drivers/log_source.h"
@@ -17,6 +18,7 @@ class LogFrameSource final : public FrameSource {
   // Throws InputError at the end of a log that gave no image at all: no calibration, no such camera, nothing
   // that could be decoded; the line says which.
   [[nodiscard]] bool next(SourceFrame* frame, StageClock* clock) override;
+  void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
   [[nodiscard]] double progress() const override;
@@ -24,6 +26,8 @@ class LogFrameSource final : public FrameSource {
   [[nodiscard]] const ipc::LogDamage& damage() const { return source_.damage(); }
   // Later calibrations that differ from the first; the first holds.
   [[nodiscard]] int calibrations_ignored() const { return calibrations_ignored_; }
+  // The image that next() gave last.
+  [[nodiscard]] const ipc::GreyImage& image() const { return image_; }
   // What to call the log in a message.
   [[nodiscard]] const std::string& name() const { return name_; }
 

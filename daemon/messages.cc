@@ -117,7 +117,7 @@ odometry_t make_odometry(const FrameOutput& frame) {
   const slam::FrameResult& r = frame.result;
   odometry_t m{};
   m.utime = r.utime;
-  m.publish_utime = r.utime;
+  m.publish_utime = r.utime + frame.age_us;
   m.sequence = r.sequence;
   set_pose(known(r.has_pose, r.T_odom_body), m.position, m.orientation);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNan);

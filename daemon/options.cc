@@ -9,6 +9,8 @@
 namespace farpoint::daemon {
 namespace {
 
+constexpr double kMaxSpeed = 1000.0;
+
 constexpr const char* kDescription =
     "farpointd: visual SLAM with distant landmarks.\n"
     "\n"
@@ -23,6 +25,8 @@ constexpr const char* kFooter =
     "  farpoint import kitti /data/kitti 03 -o run.lcm\n"
     "  farpointd --replay run.lcm --lockstep --output out.lcm --trajectory final.tum --live-trajectory "
     "live.tum\n"
+    "  farpointd --replay run.lcm --speed 1 --output live.lcm --trajectory final.tum\n"
+    "  farpointd --replay run.lcm --schedule recorded --schedule-log live.lcm --output again.lcm\n"
     "  farpointd --replay run.lcm --lockstep --can-log out.candump --set scale.assumed=1\n"
     "  farpointd --replay run.lcm --lockstep --lcm-url 'udpm://239.255.76.67:7667?ttl=0'    (watch with "
     "lcm-spy)\n"
@@ -34,7 +38,6 @@ constexpr const char* kFooter =
 struct Parsed {
   Options options;
   bool lockstep = false;
-  std::optional<double> speed;
   std::string schedule;
 };
 
@@ -50,12 +53,18 @@ void add_options(CLI::App* app, Parsed* parsed) {
       "--lockstep", parsed->lockstep,
       "One frame after the other, everything in one order: the same log and configuration give the same "
       "bytes, whatever the machine's load");
-  app->add_option("--speed", parsed->speed,
-                  "Threaded replay at X times the recorded pace (not in this version)")
+  app->add_option(
+         "--speed", o.speed,
+         "As on the vehicle: capture, tracking, mapping and output on threads of their own, images at "
+         "X times the recorded pace")
       ->type_name("X");
   app->add_option("--schedule", parsed->schedule,
-                  "'recorded': replay a live run's thread order (not in this version)")
+                  "Repeat a threaded run byte for byte, on one thread: the same frames dropped, the same map "
+                  "views used. FARPOINT_SCHEDULE is taken from the replayed log, or from --schedule-log")
       ->type_name("recorded");
+  app->add_option("--schedule-log", o.schedule_log,
+                  "The threaded run's --output, where the replayed log does not hold FARPOINT_SCHEDULE")
+      ->type_name("LOG");
   app->add_option("--output", o.output,
                   "Everything that is published, the final trajectory and a summary, as LCM log")
       ->type_name("LOG");
@@ -98,16 +107,15 @@ void check(const Parsed& parsed) {
   const Options& o = parsed.options;
   if (o.replay.empty())
     throw UsageError("--replay LOG is missing; live cameras are not in this version (see --help)");
-  if (!parsed.schedule.empty()) {
-    throw UsageError("--schedule " + parsed.schedule + ": not in this version, expected --lockstep");
-  }
-  if (parsed.lockstep && parsed.speed)
-    throw UsageError("--lockstep and --speed exclude each other, expected one");
-  if (parsed.speed) throw UsageError("--speed: threaded replay is not in this version, expected --lockstep");
-  if (!parsed.lockstep) {
-    throw UsageError(
-        "--lockstep is missing: threaded replay is not in this version, expected --replay LOG --lockstep");
-  }
+  if (!parsed.schedule.empty() && parsed.schedule != "recorded")
+    throw UsageError("--schedule " + parsed.schedule + ": unknown, expected recorded");
+  if (!o.schedule_log.empty() && parsed.schedule.empty())
+    throw UsageError("--schedule-log without --schedule recorded, expected both");
+  if (parsed.lockstep && o.speed) throw UsageError("--lockstep and --speed exclude each other, expected one");
+  if (o.speed && !(*o.speed > 0.0 && *o.speed <= kMaxSpeed))
+    throw UsageError("--speed: expected a number above 0, at most 1000");
+  if (!parsed.lockstep && !o.speed && parsed.schedule.empty())
+    throw UsageError("--lockstep, --speed X or --schedule recorded is missing, expected one of them");
   // Two outputs in one file, or an output over the input, would destroy what the user wants to keep.
   std::map<std::filesystem::path, std::string> used;
   const auto claim = [&](const std::string& path, const std::string& name) {
@@ -121,6 +129,7 @@ void check(const Parsed& parsed) {
     }
   };
   claim(o.replay, "--replay");
+  if (o.schedule_log != o.replay) claim(o.schedule_log, "--schedule-log");
   claim(o.output, "--output");
   claim(o.trajectory, "--trajectory");
   claim(o.live_trajectory, "--live-trajectory");
@@ -157,6 +166,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   }
   check(parsed);
   result.options = parsed.options;
+  // The order is the recorded one then, whatever the pace.
+  if (!parsed.schedule.empty()) {
+    result.options.speed.reset();
+    if (result.options.schedule_log.empty()) result.options.schedule_log = result.options.replay;
+  }
   return result;
 }
 

@@ -12,6 +12,10 @@ namespace farpoint::daemon {
 struct Options {
   std::optional<std::string> config_path;
   std::string replay;  // "-" is standard input
+  // Threads, at so many times the recorded pace; else one thread.
+  std::optional<double> speed;
+  // Repeat a threaded run: its schedule is in this log. Empty: no.
+  std::string schedule_log;
   std::string output, trajectory, live_trajectory, can_log;
   // Engaged but empty: wanted, with lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;

@@ -11,6 +11,8 @@ struct FrameOutput {
   slam::FrameResult result;
   // The pose counts: published as valid, part of the live trajectory.
   bool valid = false;
+  // From when the frame was due to its output; 0 in lockstep, which has no clock.
+  std::int64_t age_us = 0;
 };
 
 // The estimator's result with scale.assumed applied (0: none) and its validity decided. A result that is

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "daemon/message_sink.h"
@@ -13,6 +14,8 @@ namespace farpoint::daemon {
 
 class Publisher final : public PoseSink {
  public:
+  // Room for every message of a frame.
+  Publisher() { bytes_.reserve(std::size_t{1} << 16); }
   void add(std::unique_ptr<MessageSink> sink) { sinks_.push_back(std::move(sink)); }
   [[nodiscard]] bool has_sinks() const { return !sinks_.empty(); }
 
@@ -25,6 +28,10 @@ class Publisher final : public PoseSink {
     if (sinks_.empty()) return;
     ipc::encode(message, &bytes_);
     for (const auto& sink : sinks_) sink->send(channel, utime, bytes_);
+  }
+  // The same for bytes that are encoded already.
+  void publish_encoded(const char* channel, std::int64_t utime, std::span<const std::uint8_t> bytes) {
+    for (const auto& sink : sinks_) sink->send(channel, utime, bytes);
   }
   // Results of a whole run: into logs only.
   template <typename Message>

@@ -4,7 +4,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <opencv2/core/utility.hpp>
 
 #include "daemon/config.h"
 #include "daemon/logging.h"
@@ -32,7 +31,6 @@ Config load_configuration(const Options& options) {
 
 // Libraries that would start threads of their own sum in another order each time: one thread each.
 void make_libraries_single_threaded() {
-  cv::setNumThreads(1);
   // Where this machine's BLAS is OpenBLAS; the reference BLAS has no threads.
   if (void* set_threads = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
     reinterpret_cast<void (*)(int)>(set_threads)(1);
@@ -53,7 +51,7 @@ int run_checked(int argc, const char* const* argv) {
   const Config config = load_configuration(line.options);
   start_logging(config.log.level);
   make_libraries_single_threaded();
-  return replay_lockstep(line.options, config);
+  return replay(line.options, config);
 }
 
 }  // namespace

@@ -43,7 +43,13 @@ class StageClock final : public slam::StageListener {
   // Negative where the stage did not run in this frame.
   [[nodiscard]] double cpu_ms(int stage) const { return cpu_ms_.at(static_cast<std::size_t>(stage)); }
   [[nodiscard]] double wall_ms(int stage) const { return wall_ms_.at(static_cast<std::size_t>(stage)); }
-  [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence) const;
+  // What was measured elsewhere.
+  void set(int stage, double cpu_ms, double wall_ms) {
+    cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms;
+    wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms;
+  }
+  // age_us: from when the frame was due to its output; 0 where there is no common clock.
+  [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us) const;
 
  private:
   std::array<double, kStages> cpu_ms_{}, wall_ms_{}, cpu_began_s_{}, wall_began_s_{};

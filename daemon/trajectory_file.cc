@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 
@@ -28,11 +29,18 @@ void write_one(const std::string& path, const slam::MapTrajectory& trajectory, d
 }  // namespace
 
 std::string tum_line(std::int64_t utime, const slam::SE3& T) {
+  char line[kMaxTumLine];
+  return {line, put_tum_line(utime, T, line)};
+}
+
+std::size_t put_tum_line(std::int64_t utime, const slam::SE3& T, std::span<char, kMaxTumLine> line) {
   const std::lldiv_t seconds = std::lldiv(utime, 1'000'000);
   const char* sign = utime < 0 ? "-" : "";
-  return fmt::format("{}{}.{:06d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", sign,
-                     std::llabs(seconds.quot), std::llabs(seconds.rem), T.t.x(), T.t.y(), T.t.z(), T.q.x(),
-                     T.q.y(), T.q.z(), T.q.w());
+  const auto end = fmt::format_to_n(line.data(), line.size(),
+                                    "{}{}.{:06d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", sign,
+                                    std::llabs(seconds.quot), std::llabs(seconds.rem), T.t.x(), T.t.y(),
+                                    T.t.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w());
+  return std::min(end.size, line.size());
 }
 
 LiveTrajectory::LiveTrajectory(const std::string& path) : file_(path) {
@@ -40,7 +48,10 @@ LiveTrajectory::LiveTrajectory(const std::string& path) : file_(path) {
 }
 
 void LiveTrajectory::on_frame(const FrameOutput& frame) {
-  if (frame.valid) put(file_.stream(), tum_line(frame.result.utime, frame.result.T_map_body));
+  if (!frame.valid) return;
+  char line[kMaxTumLine];
+  const std::size_t length = put_tum_line(frame.result.utime, frame.result.T_map_body, line);
+  std::fwrite(line, 1, length, file_.stream());
 }
 
 std::string trajectory_path(const std::string& path, int map_number) {

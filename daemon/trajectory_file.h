@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ namespace farpoint::daemon {
 
 // One line with its newline. Seconds are utime / 1e6 with 6 decimals, exact; metres or map units with 9.
 [[nodiscard]] std::string tum_line(std::int64_t utime, const slam::SE3& T_map_body);
+
+// The same into a buffer, without the heap; returns its length. Long enough for any seven doubles.
+inline constexpr std::size_t kMaxTumLine = 2560;
+std::size_t put_tum_line(std::int64_t utime, const slam::SE3& T_map_body, std::span<char, kMaxTumLine> line);
 
 // Each valid pose as it is published.
 class LiveTrajectory final : public PoseSink {

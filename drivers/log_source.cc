@@ -147,6 +147,12 @@ bool LogSource::take_calibration(const ipc::LogEvent& event, LogItem* item) {
   if (!decode_message(event, &calibration)) return false;
   calibration_ = std::move(calibration);
   has_calibration_ = true;
+  // So that no image of usual size makes the message's buffer grow later.
+  constexpr std::int64_t kMostReserved = std::int64_t{8} << 20;
+  for (const camera_calibration_t& camera : calibration_.cameras) {
+    const std::int64_t pixels = std::int64_t{std::max(camera.width, 0)} * std::max(camera.height, 0);
+    image_.data.reserve(static_cast<std::size_t>(std::min(pixels, kMostReserved)));
+  }
   ++counts_.calibrations;
   item->kind = LogItemKind::kCalibration;
   item->utime = calibration_.utime;

@@ -9,6 +9,7 @@ inline constexpr char kPoseChannel[] = "FARPOINT_POSE";                  // pose
 inline constexpr char kMapFromOdomChannel[] = "FARPOINT_MAP_FROM_ODOM";  // map_from_odom_t
 inline constexpr char kStatusChannel[] = "FARPOINT_STATUS";              // status_t
 inline constexpr char kTimingChannel[] = "FARPOINT_TIMING";              // timing_t
+inline constexpr char kScheduleChannel[] = "FARPOINT_SCHEDULE";          // schedule_t, threaded runs
 inline constexpr char kMapChannel[] = "FARPOINT_MAP";                    // map_t
 inline constexpr char kBotCorePoseChannel[] = "POSE";  // bot_core::pose_t, for MIT's viewers
 

@@ -87,10 +87,17 @@ void ask_for_grey(png_structp png, png_infop info) {
   png_set_strip_alpha(png);
 }
 
+png_voidp allocate_for_png(png_structp png, png_alloc_size_t bytes) {
+  return static_cast<DecodeArena*>(png_get_mem_ptr(png))->allocate(bytes);
+}
+void free_with_the_image(png_structp, png_voidp) {}
+
 // No object with a destructor may live here: libpng leaves by longjmp.
-ImageStatus decode_png(const image_t& message, GreyImage* image) {
+ImageStatus decode_png(const image_t& message, DecodeArena* arena, GreyImage* image) {
   PngReader reader{payload(message)};
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, leave_png, ignore_png_warning);
+  arena->reset();
+  png_structp png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, nullptr, leave_png, ignore_png_warning,
+                                             arena, allocate_for_png, free_with_the_image);
   if (png == nullptr) return ImageStatus::kDamaged;
   png_infop info = png_create_info_struct(png);
   volatile ImageStatus status = ImageStatus::kDamaged;
@@ -169,6 +176,8 @@ struct ImageDecoder::Jpeg {
   jpeg_progress_mgr progress{};
   std::jmp_buf way_out{};
   bool damaged = false;
+  DecodeArena* arena = nullptr;
+  jpeg_memory_mgr library{};  // libjpeg's own memory functions
 
   static Jpeg* of(j_common_ptr common) { return static_cast<Jpeg*>(common->client_data); }
 
@@ -182,6 +191,45 @@ struct ImageDecoder::Jpeg {
   }
   static void limit_scans(j_common_ptr common) {
     if (reinterpret_cast<j_decompress_ptr>(common)->input_scan_number > kMaxJpegScans) leave(common);
+  }
+
+  // What belongs to one image comes from the arena, what stays from libjpeg.
+  static void* allocate(j_common_ptr common, int pool, std::size_t bytes) {
+    if (pool != JPOOL_IMAGE) return of(common)->library.alloc_small(common, pool, bytes);
+    void* piece = of(common)->arena->allocate(bytes);
+    if (piece == nullptr) leave(common);
+    return piece;
+  }
+  template <typename Row>
+  static Row* allocate_rows(j_common_ptr common, std::size_t row_bytes, JDIMENSION rows) {
+    // Rows of whole alignment units, two of them where SIMD writes beyond the end.
+    constexpr std::size_t kUnit = 2 * DecodeArena::kAlignment;
+    row_bytes = (row_bytes + kUnit - 1) / kUnit * kUnit;
+    auto* row = static_cast<Row*>(allocate(common, JPOOL_IMAGE, rows * sizeof(Row)));
+    auto* bytes = static_cast<std::uint8_t*>(allocate(common, JPOOL_IMAGE, rows * row_bytes));
+    for (JDIMENSION i = 0; i < rows; ++i) row[i] = reinterpret_cast<Row>(bytes + i * row_bytes);
+    return row;
+  }
+  static JSAMPARRAY allocate_samples(j_common_ptr common, int pool, JDIMENSION width, JDIMENSION rows) {
+    if (pool != JPOOL_IMAGE) return of(common)->library.alloc_sarray(common, pool, width, rows);
+    return allocate_rows<JSAMPROW>(common, width * sizeof(JSAMPLE), rows);
+  }
+  static JBLOCKARRAY allocate_blocks(j_common_ptr common, int pool, JDIMENSION width, JDIMENSION rows) {
+    if (pool != JPOOL_IMAGE) return of(common)->library.alloc_barray(common, pool, width, rows);
+    return allocate_rows<JBLOCKROW>(common, width * sizeof(JBLOCK), rows);
+  }
+  static void free_pool(j_common_ptr common, int pool) {
+    of(common)->library.free_pool(common, pool);
+    if (pool == JPOOL_IMAGE) of(common)->arena->reset();
+  }
+  void use_arena(DecodeArena* memory) {
+    arena = memory;
+    library = *decoder.mem;
+    decoder.mem->alloc_small = allocate;
+    decoder.mem->alloc_large = allocate;
+    decoder.mem->alloc_sarray = allocate_samples;
+    decoder.mem->alloc_barray = allocate_blocks;
+    decoder.mem->free_pool = free_pool;
   }
 
   Jpeg() {
@@ -250,6 +298,7 @@ ImageDecoder::ImageDecoder() : jpeg_(std::make_unique<Jpeg>()) {
   if (setjmp(jpeg_->way_out) != 0) throw std::bad_alloc();
   jpeg_create_decompress(&jpeg_->decoder);
   jpeg_->decoder.client_data = jpeg_.get();
+  jpeg_->use_arena(&arena_);
 }
 
 ImageDecoder::~ImageDecoder() = default;
@@ -261,7 +310,7 @@ ImageStatus ImageDecoder::decode(const image_t& message, GreyImage* image) {
     case image_t::PIXEL_FORMAT_MJPEG:
       return payload(message).empty() ? ImageStatus::kDamaged : jpeg_->decode(message, image);
     case image_t::PIXEL_FORMAT_PNG:
-      return decode_png(message, image);
+      return decode_png(message, &arena_, image);
     default:
       return ImageStatus::kUnknownFormat;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "farpoint/image_t.hpp"
+#include "ipc/decode_arena.h"
 
 namespace farpoint::ipc {
 
@@ -37,7 +38,8 @@ struct ImageInfo {
 
 inline constexpr int kMaxImageSide_px = 16384;
 
-// Keeps the decoders' working memory from image to image. Not thread-safe: one a thread.
+// Keeps the decoders' working memory from image to image: no heap call after the first images (a progressive
+// JPEG excepted, which is decoded as a whole). Not thread-safe: one a thread.
 class ImageDecoder {
  public:
   ImageDecoder();
@@ -51,6 +53,7 @@ class ImageDecoder {
 
  private:
   struct Jpeg;
+  DecodeArena arena_;  // of the image being decoded
   std::unique_ptr<Jpeg> jpeg_;
 };
 

@@ -160,6 +160,7 @@ bool LogReader::next(LogEvent* event) {
 }
 
 LogWriter::LogWriter(const std::string& path) : path_(path) {
+  channel_.reserve(LogReader::kMaxChannelBytes);
   log_ = lcm_eventlog_create(path_.writable().c_str(), "w");
   if (log_ == nullptr)
     throw std::runtime_error("cannot write log " + path_.target() + ": " + std::strerror(errno));

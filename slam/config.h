@@ -35,6 +35,7 @@ struct CapacityConfig {
   int landmarks = 40000;               // bearing, weak and full together
   int observations_per_landmark = 48;  // beyond it the oldest in between are thinned out
   int window_images = 24;              // keyframes that keep their pyramid for alignment
+  int view_landmarks = 6000;           // that tracking is shown at once
 };
 
 struct InitialisationConfig {

@@ -1,7 +1,11 @@
 // The facade of the estimator: frames in, poses out. No I/O, no threads, no clock, no logging, no globals.
 //
-// Lockstep: one call of process() tracks one frame, runs the mapping jobs in a fixed order and takes their
-// results a configured number of frames later, as a real-time run would.
+// Two halves that share nothing but fixed rings: tracking (slam/tracking_side.h) and mapping
+// (slam/mapping_side.h). Who runs them is the caller's choice:
+//   lockstep  process() tracks one frame, runs the mapping jobs it asked for, and takes their results a
+//             configured number of frames later, as a real-time run would;
+//   threads   track() on one thread, map() on another; a frame takes what mapping has ready;
+//   recorded  process_recorded() repeats a run of threads: each frame takes what it took then.
 #pragma once
 
 #include <cstdint>
@@ -68,7 +72,10 @@ struct FrameResult {
   std::int32_t map_id = 0;
   std::uint64_t view_sequence = 0;  // local-map view this frame was tracked against
   int features = 0, matches = 0, inliers = 0, aligned = 0;
-  bool keyframe = false;
+  bool keyframe = false;            // sent to mapping
+  std::uint64_t replies_taken = 0;  // of mapping, since the start: what the frame knew of the map
+  std::uint64_t job = 0;            // number of the last job it gave to mapping, 0: none
+  int jobs_under_way = 0;           // mapping's queue, the job being worked on included
 
   // Tracked against a map that had been there before the frame: what tracking's times are about.
   [[nodiscard]] bool followed() const { return view_sequence > 0 && state != State::kInitialising; }
@@ -77,6 +84,8 @@ struct FrameResult {
 // Counts over the whole run and of the present map.
 struct EstimatorCounts {
   std::uint64_t frames = 0, frames_rejected = 0, keyframes_made = 0, keyframes_culled = 0, maps = 0, lost = 0;
+  std::uint64_t keyframes_dropped = 0;    // wanted, and not made because mapping was behind
+  std::uint64_t frames_not_recorded = 0;  // missing in the final trajectory: mapping was far behind
   std::uint64_t landmarks_made = 0, landmarks_culled = 0, landmarks_fused = 0;
   std::uint64_t vmp_made = 0, vmp_attached = 0, vmp_merged = 0, vmp_promoted = 0, vmp_rejected = 0,
                 vmp_evicted = 0;
@@ -115,6 +124,14 @@ struct CalibrationInfo {
   double focal_scale_sigma = 0, cx_sigma_px = 0, cy_sigma_px = 0, k1_sigma = 0;  // 1 sigma
 };
 
+// A view that mapping has made.
+struct MappingNote {
+  std::uint64_t reply = 0;  // a frame with replies_taken of at least this has taken it
+  std::int64_t utime = 0;   // of the frame that asked for it
+  std::int32_t map_id = 0;
+  bool full = false;  // after local bundle adjustment
+};
+
 class Estimator {
  public:
   // Allocates everything. Throws std::invalid_argument with a sentence a user can act on where the
@@ -129,13 +146,30 @@ class Estimator {
   const FrameResult& process(const FrameInput& input);
   const FrameResult& process(FeatureInput&& input);
 
-  // Announces the stages of every later frame; null: to nobody. The listener must outlive its use.
+  // Announces the stages of every later frame; null: to nobody. The listener must outlive its use, and is
+  // called on the thread that does the work: for one thread only.
   void listen(StageListener* listener);
 
-  // Finishes what mapping had queued; no extra optimisation.
+  // Threads. track() is process() without mapping. map() works on the oldest job up to its next reply; false
+  // where no job waits (FrameResult::job says when one was given).
+  const FrameResult& track(const FrameInput& input);
+  bool map();
+
+  // Repeats one frame of a run of threads: mapping works until it has given so many replies, and the frame
+  // takes them all (FrameResult::replies_taken). Where mapping runs out of jobs before, the run is another:
+  // the result's replies_taken is then smaller.
+  const FrameResult& process_recorded(const FrameInput& input, std::uint64_t replies_taken);
+
+  // Is called when mapping has made a view, on mapping's thread, before tracking can take it. landmarks() and
+  // keyframe_poses() may be called then.
+  void on_view(std::function<void(const MappingNote&)> observer);
+
+  // Finishes what mapping had queued; no extra optimisation. Threads must have ended.
   void finish();
 
+  // As of the last frame; tracking's thread. After finish(): of the whole run.
   [[nodiscard]] const EstimatorCounts& counts() const;
+  // What follows belongs to mapping's thread, or to anyone while no thread runs.
   // All maps, most frames first.
   [[nodiscard]] std::vector<MapTrajectory> trajectories() const;
   [[nodiscard]] std::vector<LandmarkInfo> landmarks() const;

@@ -151,18 +151,18 @@ double truncated_cost(Bearings bearings, Points points, double sigma_rad, const 
   return cost;
 }
 
-std::vector<uint8_t> inlier_mask(Bearings bearings, Points points, double sigma_rad, const SE3& pose) {
+// Counts the inliers, and marks them where there is a mask.
+size_t find_inliers(Bearings bearings, Points points, double sigma_rad, const SE3& pose,
+                    std::vector<uint8_t>* mask) {
   const Eigen::Matrix3d r = pose.rotation();
-  std::vector<uint8_t> mask(bearings.size());
+  size_t count = 0;
   for (size_t i = 0; i < bearings.size(); ++i) {
     const double r2 = bearing_error2_rad2(r, pose.t, bearings[i], points[i]);
-    mask[i] = r2 < kChi2_2Dof * sigma_rad * sigma_rad ? 1 : 0;
+    const bool inlier = r2 < kChi2_2Dof * sigma_rad * sigma_rad;
+    if (mask != nullptr) (*mask)[i] = inlier ? 1 : 0;
+    count += inlier ? 1U : 0U;
   }
-  return mask;
-}
-
-size_t count_set(const std::vector<uint8_t>& mask) {
-  return static_cast<size_t>(std::count(mask.begin(), mask.end(), uint8_t{1}));
+  return count;
 }
 
 int needed_samples(double inlier_share, int max_samples) {
@@ -187,12 +187,39 @@ bool find_pose(Bearings bearings, Points points, double sigma_rad, const PnpOpti
       if (cost >= best_cost) continue;
       best_cost = cost;
       *best = pose;
-      const size_t inliers = count_set(inlier_mask(bearings, points, sigma_rad, pose));
+      const size_t inliers = find_inliers(bearings, points, sigma_rad, pose, nullptr);
       const double share = static_cast<double>(inliers) / static_cast<double>(bearings.size());
       samples = needed_samples(share, options.max_samples);
     }
   }
   return best_cost < std::numeric_limits<double>::max();
+}
+
+SE3 refine_pose_in(Bearings bearings_c, Points points_w, double sigma_rad, const SE3& T_camera_world,
+                   PnpWorkspace* workspace) {
+  // World coordinates may be large: work relative to the points' centre, where rotation and translation part.
+  const size_t n = std::min(bearings_c.size(), points_w.size());
+  if (n == 0) return T_camera_world;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < n; ++i) centre += points_w[i];
+  centre /= static_cast<double>(n);
+  std::vector<Eigen::Vector3d>& points = workspace->points;
+  std::vector<size_t>& use = workspace->use;
+  points.assign(points_w.begin(), points_w.begin() + static_cast<std::ptrdiff_t>(n));
+  for (Eigen::Vector3d& p : points) p -= centre;
+
+  SE3 pose = {T_camera_world.q, T_camera_world * centre};
+  for (const double limit_sigma : kLimits_sigma) {
+    const double limit2 = limit_sigma * limit_sigma * sigma_rad * sigma_rad;
+    const Eigen::Matrix3d r = pose.rotation();
+    use.clear();
+    for (size_t i = 0; i < n; ++i) {
+      if (bearing_error2_rad2(r, pose.t, bearings_c[i], points[i]) < limit2) use.push_back(i);
+    }
+    if (use.size() < 4) break;
+    pose = descend(bearings_c, points, use, sigma_rad, pose);
+  }
+  return {pose.q, pose.t - pose.q * centre};
 }
 
 }  // namespace
@@ -246,42 +273,39 @@ PoseCandidates solve_p3p(std::span<const Eigen::Vector3d, 3> bearings_c,
 
 SE3 refine_pose(std::span<const Eigen::Vector3d> bearings_c, std::span<const Eigen::Vector3d> points_w,
                 double sigma_rad, const SE3& T_camera_world) {
-  // World coordinates may be large: work relative to the points' centre, where rotation and translation part.
-  const size_t n = std::min(bearings_c.size(), points_w.size());
-  if (n == 0) return T_camera_world;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (size_t i = 0; i < n; ++i) centre += points_w[i];
-  centre /= static_cast<double>(n);
-  std::vector<Eigen::Vector3d> points(points_w.begin(), points_w.begin() + static_cast<std::ptrdiff_t>(n));
-  for (Eigen::Vector3d& p : points) p -= centre;
+  PnpWorkspace workspace;
+  return refine_pose_in(bearings_c, points_w, sigma_rad, T_camera_world, &workspace);
+}
 
-  SE3 pose = {T_camera_world.q, T_camera_world * centre};
-  std::vector<size_t> use;
-  for (const double limit_sigma : kLimits_sigma) {
-    const double limit2 = limit_sigma * limit_sigma * sigma_rad * sigma_rad;
-    const Eigen::Matrix3d r = pose.rotation();
-    use.clear();
-    for (size_t i = 0; i < n; ++i) {
-      if (bearing_error2_rad2(r, pose.t, bearings_c[i], points[i]) < limit2) use.push_back(i);
-    }
-    if (use.size() < 4) break;
-    pose = descend(bearings_c, points, use, sigma_rad, pose);
-  }
-  return {pose.q, pose.t - pose.q * centre};
+void PnpWorkspace::reserve(size_t matches) {
+  // Touched, not only reserved.
+  points.resize(matches);
+  use.resize(matches);
+  result.inlier.resize(matches);
 }
 
 PnpResult solve_pnp(std::span<const Eigen::Vector3d> bearings_c, std::span<const Eigen::Vector3d> points_w,
                     double sigma_rad, const PnpOptions& options) {
-  PnpResult result;
+  PnpWorkspace workspace;
+  return solve_pnp(bearings_c, points_w, sigma_rad, options, &workspace);
+}
+
+const PnpResult& solve_pnp(std::span<const Eigen::Vector3d> bearings_c,
+                           std::span<const Eigen::Vector3d> points_w, double sigma_rad,
+                           const PnpOptions& options, PnpWorkspace* workspace) {
+  PnpResult& result = workspace->result;
+  result.ok = false;
+  result.T_camera_world = SE3{};
+  result.inliers = 0;
+  result.rms_rad = 0.0;
   const size_t n = std::min(bearings_c.size(), points_w.size());
   result.inlier.assign(n, 0);
   if (n < std::max<size_t>(4, options.min_inliers) || !(sigma_rad > 0.0)) return result;
   bearings_c = bearings_c.first(n);
   points_w = points_w.first(n);
   if (!find_pose(bearings_c, points_w, sigma_rad, options, &result.T_camera_world)) return result;
-  result.T_camera_world = refine_pose(bearings_c, points_w, sigma_rad, result.T_camera_world);
-  result.inlier = inlier_mask(bearings_c, points_w, sigma_rad, result.T_camera_world);
-  result.inliers = count_set(result.inlier);
+  result.T_camera_world = refine_pose_in(bearings_c, points_w, sigma_rad, result.T_camera_world, workspace);
+  result.inliers = find_inliers(bearings_c, points_w, sigma_rad, result.T_camera_world, &result.inlier);
   const Eigen::Matrix3d r = result.T_camera_world.rotation();
   double sum = 0.0;
   for (size_t i = 0; i < n; ++i) {

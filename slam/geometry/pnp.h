@@ -46,6 +46,19 @@ struct PnpResult {
                                   std::span<const Eigen::Vector3d> points_w, double sigma_rad,
                                   const PnpOptions& options = {});
 
+// Memory of solve_pnp(), kept from call to call: with it no call allocates that has at most as many matches
+// as reserve() was given.
+struct PnpWorkspace {
+  void reserve(size_t matches);
+  std::vector<Eigen::Vector3d> points;  // relative to their centre
+  std::vector<size_t> use;
+  PnpResult result;
+};
+// The same, in the workspace's memory; the result is the workspace's until the next call.
+const PnpResult& solve_pnp(std::span<const Eigen::Vector3d> bearings_c,
+                           std::span<const Eigen::Vector3d> points_w, double sigma_rad,
+                           const PnpOptions& options, PnpWorkspace* workspace);
+
 // Minimises the Huber cost of the bearing errors from a close pose; takes the matches within 3 sigma (8 at
 // first) anew in each round.
 [[nodiscard]] SE3 refine_pose(std::span<const Eigen::Vector3d> bearings_c,

@@ -13,6 +13,10 @@ class FeatureGrid {
   FeatureGrid(int width_px, int height_px, int cell_px, std::size_t max_features);
   FeatureGrid() = default;
 
+  [[nodiscard]] std::size_t bytes() const {
+    return (starts_.capacity() + indices_.capacity()) * sizeof(std::uint32_t);
+  }
+
   // Sorts the features into cells (counting sort, stable: ascending index within a cell).
   void build(const std::vector<Feature>& features);
 

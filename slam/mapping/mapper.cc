@@ -17,12 +17,27 @@ constexpr std::uint64_t kProbation_keyframes = 3;
 // After residuals that nothing explains, so many sound optimisations in a row before poses are called valid
 // again, in a new map too: what bent the one is there in the other.
 constexpr int kTrustedRun = 10;
+// Keyframes of a view: the reference, its neighbours, and theirs.
+constexpr std::size_t kViewNeighbours = 30, kViewSecondRing = 10, kViewSecondNeighbours = 5;
+// Views in somebody's hands at once: the one tracking has, a quick and a full one on their way to it, one
+// that frames are posed against, and the one being made.
+constexpr std::size_t kViews = 5;
+
+std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
+  auto view = std::make_shared<LocalView>();
+  view->landmarks.resize(static_cast<std::size_t>(config.capacity.view_landmarks));
+  view->keyframes.resize(1 + kViewNeighbours + kViewSecondRing * kViewSecondNeighbours);
+  view->landmarks.clear();
+  view->keyframes.clear();
+  return view;
+}
 
 }  // namespace
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
       map_(config.capacity, rig),
+      views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
       calibrator_(config.calibration, rig.cameras.front().camera),
       consistent_run_(kTrustedRun) {
@@ -506,6 +521,12 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
   }
 }
 
+void Mapper::retire_map(std::int32_t map_id) {
+  map_.keyframes().for_each([map_id](KeyframeHandle, Keyframe& k) {
+    if (k.map_id == map_id) k.image.reset();
+  });
+}
+
 void Mapper::limit_memory(KeyframeHandle newest) {
   // Pixels stay with the newest keyframes only.
   const auto images = static_cast<std::uint64_t>(config_.capacity.window_images);
@@ -540,8 +561,20 @@ void Mapper::limit_memory(KeyframeHandle newest) {
 // -------------------------------------------------------------------------------------------------------------
 // view
 
+std::size_t Mapper::view_bytes() const {
+  const LocalView& view = views_.sample();
+  return views_.capacity() * (sizeof(LocalView) + view.landmarks.capacity() * sizeof(ViewLandmark) +
+                              view.keyframes.capacity() * sizeof(ViewKeyframe));
+}
+
 std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
-  auto view = std::make_shared<LocalView>();
+  const std::shared_ptr<LocalView> view = views_.take();
+  if (!view) return view;
+  view->keyframes.clear();
+  view->landmarks.clear();
+  view->reference_landmarks = 0;
+  view->map_keyframes = 0;
+  view->median_depth = LocalView{}.median_depth;
   const Keyframe& centre = map_.keyframes()[reference];
   view->sequence = ++view_sequence_;
   view->map_id = centre.map_id;
@@ -557,10 +590,10 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
     member[h.index] = 1;
     members.push_back(h);
   };
-  for (const KeyframeHandle& h : neighbours(reference, 30)) add(h);
+  for (const KeyframeHandle& h : neighbours(reference, kViewNeighbours)) add(h);
   // The neighbours' neighbours: what the vehicle saw before a turn comes back into view after it.
-  for (std::size_t i = 1, n = std::min<std::size_t>(members.size(), 10); i < n; ++i)
-    for (const KeyframeHandle& h : neighbours(members[i], 5)) add(h);
+  for (std::size_t i = 1, n = std::min(members.size(), kViewSecondRing); i < n; ++i)
+    for (const KeyframeHandle& h : neighbours(members[i], kViewSecondNeighbours)) add(h);
 
   std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
   std::vector<double> depths;
@@ -572,6 +605,8 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
     for (const LandmarkHandle& lh : k.landmarks) {
       const Landmark* l = map_.landmarks().get(lh);
       if (l == nullptr || !holds_pose(*l) || taken[lh.index] != 0) continue;
+      // Nearest keyframes first: what does not fit is what is seen least.
+      if (view->landmarks.size() == static_cast<std::size_t>(config_.capacity.view_landmarks)) break;
       taken[lh.index] = 1;
       ViewLandmark v;
       v.handle = lh;

@@ -12,6 +12,7 @@
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
+#include "slam/map/shared_pool.h"
 #include "slam/mapping/bundle_problem.h"
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
@@ -39,6 +40,9 @@ class Mapper {
   [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
   [[nodiscard]] std::uint64_t newest_id() const { return newest_id_; }
   void discard_map(std::int32_t map_id) { map_.discard_map(map_id); }
+  // The map is kept, but not built on any more: its keyframes give back their pixels.
+  void retire_map(std::int32_t map_id);
+  [[nodiscard]] std::size_t view_bytes() const;
 
  private:
   KeyframeHandle make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);
@@ -65,10 +69,12 @@ class Mapper {
 
   void cull_keyframes(KeyframeHandle newest);
   void limit_memory(KeyframeHandle newest);
+  // From the pool; null where all views are in somebody's hands.
   std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);
 
   const EstimatorConfig config_;
   Map map_;
+  SharedPool<LocalView> views_;
   MappingCounts counts_;
   LandmarkMaker maker_;
   Calibrator calibrator_;

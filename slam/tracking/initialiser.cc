@@ -17,11 +17,17 @@ constexpr int kMinMatches = 80;
 // next to the reference gave, chance matches prevail.
 constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
-constexpr std::size_t kHistoryFrames = 60;
 
 }  // namespace
 
-Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {}
+Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {
+  history_.reserve(kHistoryFrames + 1);
+}
+
+void Initialiser::remember(std::shared_ptr<Frame> frame) {
+  history_.push_back(std::move(frame));
+  if (history_.size() > kHistoryFrames) history_.erase(history_.begin());
+}
 
 void Initialiser::clear() {
   history_.clear();
@@ -34,6 +40,14 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   most_matches_ = 0;
   expected_px_.clear();
   for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
+}
+
+// Only the frame half way between the reference and now can be the next reference. What is older never can
+// again: those pixels go back to the pool.
+void Initialiser::forget_pixels(std::uint64_t age) {
+  const std::uint64_t half = reference_->number + (age + 1) / 2;
+  for (const std::shared_ptr<Frame>& f : history_)
+    if (f->number < half && f != reference_) f->image.reset();
 }
 
 void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
@@ -115,8 +129,7 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
 }
 
 std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
-  history_.push_back(frame);
-  if (history_.size() > kHistoryFrames) history_.pop_front();
+  remember(frame);
   if (!reference_) {
     set_reference(frame);
     return {};
@@ -125,6 +138,7 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
   last_matches_ = static_cast<int>(pairs_.size());
   const auto age = frame->number - reference_->number;
   most_matches_ = std::max(most_matches_, last_matches_);
+  forget_pixels(age);
   const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * most_matches_));
   if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
     // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,

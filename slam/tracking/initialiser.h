@@ -2,7 +2,6 @@
 // rotation alone, a plane that can be read two ways, or too little parallax mean waiting.
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -14,13 +13,18 @@ namespace farpoint::slam {
 
 class Initialiser {
  public:
+  // Frames that are kept to be posed once there is a map.
+  static constexpr std::size_t kHistoryFrames = 60;
+
   Initialiser(const EstimatorConfig& config, const Rig& rig);
 
   // A pair once there is one. The frame joins the history either way.
   std::optional<InitialPair> add(std::shared_ptr<Frame> frame);
+  // The frame joins the history, and nothing is searched: a pair is being made into a map.
+  void remember(std::shared_ptr<Frame> frame);
   void clear();
   // Frames waited with, oldest first: to be posed once there is a map.
-  [[nodiscard]] const std::deque<std::shared_ptr<Frame>>& history() const { return history_; }
+  [[nodiscard]] const std::vector<std::shared_ptr<Frame>>& history() const { return history_; }
   [[nodiscard]] int last_matches() const { return last_matches_; }
 
  private:
@@ -28,13 +32,14 @@ class Initialiser {
     std::size_t feature_first = 0, feature_second = 0;
   };
   void set_reference(std::shared_ptr<Frame> frame);
+  void forget_pixels(std::uint64_t age);
   void match(const Frame& frame, std::vector<Pairing>* out);
   std::optional<InitialPair> solve(const std::shared_ptr<Frame>& frame,
                                    const std::vector<Pairing>& pairs) const;
 
   const EstimatorConfig config_;
   const Rig rig_;
-  std::deque<std::shared_ptr<Frame>> history_;
+  std::vector<std::shared_ptr<Frame>> history_;
   std::shared_ptr<Frame> reference_;
   std::vector<Eigen::Vector2f> expected_px_;  // where each reference feature was seen last
   std::vector<Pairing> pairs_;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <optional>
 
-#include "slam/geometry/pnp.h"
-
 namespace farpoint::slam {
 
 namespace {
@@ -15,6 +13,20 @@ constexpr double kMinViewCosine = 0.5;  // 60 degrees from the anchor's view a p
 // Sizes beyond these cannot be matched: the patch has no pixels left, or too few.
 constexpr float kMinScaleChange = 0.3F, kMaxScaleChange = 3.3F;
 
+constexpr std::uint32_t kNotInView = 0xFFFFFFFFU;
+
+// Room for so many, in memory that has been written to.
+template <typename T>
+void touch(std::vector<T>* values, std::size_t count) {
+  values->resize(count);
+  values->clear();
+}
+
+template <typename T>
+std::size_t capacity_bytes(const std::vector<T>& values) {
+  return values.capacity() * sizeof(T);
+}
+
 bool scale_fits(float change) {
   return change > kMinScaleChange && change < kMaxScaleChange;
 }
@@ -22,11 +34,35 @@ bool scale_fits(float change) {
 }  // namespace
 
 Tracker::Tracker(const EstimatorConfig& config) : config_(config) {
-  counts_.resize(static_cast<std::size_t>(config.capacity.landmarks));
-  counted_slots_.reserve(counts_.size());
-  view_index_of_slot_.assign(counts_.size(), 0);
+  const auto landmarks = static_cast<std::size_t>(config.capacity.landmarks),
+             in_view = static_cast<std::size_t>(config.capacity.view_landmarks),
+             features = static_cast<std::size_t>(config.extractor.features);
+  touch(&candidates_, in_view);
+  touch(&matches_, features);
+  touch(&feature_match_, features);
+  touch(&measurements_, features);
+  touch(&last_seen_, features);
+  touch(&seen_last_frame_, in_view);
+  touch(&matched_, in_view);
+  touch(&candidate_of_, in_view);
+  touch(&motions_, features);
+  touch(&bearings_, in_view);
+  touch(&points_, in_view);
+  pnp_.reserve(in_view);
+  touch(&counted_slots_, landmarks);
+  view_index_of_slot_.assign(landmarks, 0);
+  counts_.resize(landmarks);
   for (int l = 0; l < config.pyramid.levels; ++l)
     level_scale_.push_back(std::pow(config.pyramid.scale_factor, l));
+}
+
+std::size_t Tracker::bytes() const {
+  return capacity_bytes(candidates_) + capacity_bytes(matches_) + capacity_bytes(feature_match_) +
+         capacity_bytes(measurements_) + capacity_bytes(last_seen_) + capacity_bytes(seen_last_frame_) +
+         capacity_bytes(matched_) + capacity_bytes(candidate_of_) + capacity_bytes(motions_) +
+         capacity_bytes(bearings_) + 2 * capacity_bytes(points_) + capacity_bytes(pnp_.use) +
+         capacity_bytes(pnp_.result.inlier) + capacity_bytes(counted_slots_) +
+         capacity_bytes(view_index_of_slot_) + capacity_bytes(counts_);
 }
 
 void Tracker::set_view(std::shared_ptr<const LocalView> view) {
@@ -41,10 +77,19 @@ void Tracker::set_view(std::shared_ptr<const LocalView> view) {
     }
   }
   view_ = std::move(view);
+  mark_seen(last_seen_);
+}
+
+void Tracker::adopt(std::shared_ptr<const LocalView> view, std::span<const LandmarkHandle> seen) {
+  view_ = std::move(view);
+  if (view_) mark_seen(seen);
+}
+
+void Tracker::mark_seen(std::span<const LandmarkHandle> seen) {
   seen_last_frame_.assign(view_->landmarks.size(), 0);
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i)
     view_index_of_slot_[view_->landmarks[i].handle.index] = static_cast<std::uint32_t>(i);
-  for (const LandmarkHandle& h : last_seen_) {
+  for (const LandmarkHandle& h : seen) {
     // What an older view left there names another landmark, or none.
     const std::uint32_t i = view_index_of_slot_[h.index];
     if (i < view_->landmarks.size() && view_->landmarks[i].handle == h) seen_last_frame_[i] = 1;
@@ -241,25 +286,22 @@ TrackOutcome Tracker::fine_pose(const Frame& frame, const SE3& start) {
   return out;
 }
 
-double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_body) const {
+double Tracker::motion_since_reference(const Frame& frame, const SE3& T_world_body) {
   // Parallax in pixels: where landmarks are now against where rotation alone would have put them.
   const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
-  const SE3 T_c_w = (T_world_body * camera.T_body_camera).inverse();
   const Eigen::Vector3d centre = (T_world_body * camera.T_body_camera).t;
   const Eigen::Vector3d reference = (view_->T_world_reference * camera.T_body_camera).t;
-  std::vector<double> motions;
-  motions.reserve(matches_.size());
+  motions_.clear();
   for (const Match& m : matches_) {
     if (!m.inlier || !view_->landmarks[m.view_index].confirmed) continue;
     const Eigen::Vector4d& p = view_->landmarks[m.view_index].point_w;
     const Eigen::Vector3d now = p.head<3>() - p[3] * centre, then = p.head<3>() - p[3] * reference;
-    motions.push_back(std::atan2(now.cross(then).norm(), now.dot(then)) * camera.camera.focal_px());
+    motions_.push_back(std::atan2(now.cross(then).norm(), now.dot(then)) * camera.camera.focal_px());
   }
-  (void)T_c_w;
-  if (motions.empty()) return 0.0;
-  std::nth_element(motions.begin(), motions.begin() + static_cast<std::ptrdiff_t>(motions.size() / 2),
-                   motions.end());
-  return motions[motions.size() / 2];
+  if (motions_.empty()) return 0.0;
+  std::nth_element(motions_.begin(), motions_.begin() + static_cast<std::ptrdiff_t>(motions_.size() / 2),
+                   motions_.end());
+  return motions_[motions_.size() / 2];
 }
 
 TrackOutcome Tracker::track(const Frame& frame) {
@@ -280,7 +322,8 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
   matches_.clear();
   if (!view_) return {};
   const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
-  std::vector<Eigen::Vector3d> bearings, points;
+  bearings_.clear();
+  points_.clear();
   DescriptorQuery q;
   q.u_px = static_cast<float>(camera.camera.width_px()) / 2;
   q.v_px = static_cast<float>(camera.camera.height_px()) / 2;
@@ -296,10 +339,10 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
     const Feature& feature = frame.set.features[static_cast<std::size_t>(f)];
     Eigen::Vector3d bearing;
     if (!camera.camera.unproject({feature.u_px, feature.v_px}, &bearing)) continue;
-    bearings.push_back(bearing);
-    points.push_back(l.point_w.head<3>() / l.point_w[3]);
+    bearings_.push_back(bearing);
+    points_.push_back(l.point_w.head<3>() / l.point_w[3]);
   }
-  const PnpResult pnp = solve_pnp(bearings, points, 2.0 / camera.camera.focal_px(), PnpOptions{});
+  const PnpResult& pnp = solve_pnp(bearings_, points_, 2.0 / camera.camera.focal_px(), PnpOptions{}, &pnp_);
   if (!pnp.ok) return {};
   const SE3 T_world_body = (camera.T_body_camera * pnp.T_camera_world).inverse();
   return track_from(frame, T_world_body);

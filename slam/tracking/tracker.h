@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/geometry/pnp.h"
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/predict.h"
@@ -43,6 +45,10 @@ class Tracker {
   // Takes a newer view. Pose and motion prior move with the reference keyframe's correction.
   void set_view(std::shared_ptr<const LocalView> view);
   [[nodiscard]] const LocalView* view() const { return view_.get(); }
+  [[nodiscard]] std::shared_ptr<const LocalView> shared_view() const { return view_; }
+  // Another tracker's view, and the landmarks its newest frame saw: for frames posed afterwards. Null lets go
+  // of it.
+  void adopt(std::shared_ptr<const LocalView> view, std::span<const LandmarkHandle> seen);
 
   // Forgets pose, prior and matches: a new map begins at this pose.
   void start(const SE3& T_world_body, std::int64_t utime);
@@ -60,11 +66,15 @@ class Tracker {
   // Inlier sightings of the last search, and the counts since take_counts() was last called.
   void sightings(std::vector<Sighting>* out) const;
   void take_counts(std::vector<SightingCount>* out);
+  // Landmarks that the last accepted frame saw.
+  void last_seen(std::vector<LandmarkHandle>* out) const { *out = last_seen_; }
 
   [[nodiscard]] const SE3& T_world_body() const { return T_world_body_; }
   [[nodiscard]] const std::vector<Match>& matches() const { return matches_; }
   // Relative motion of the last accepted frames per second, body axes (translation, rotation).
   [[nodiscard]] Vector6d velocity_body() const { return velocity_; }
+  // Of the work space.
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct Candidate {
@@ -75,6 +85,7 @@ class Tracker {
   // Which of the view's landmarks are looked for.
   enum class Among : std::uint8_t { kLastFrame, kAll };
 
+  void mark_seen(std::span<const LandmarkHandle> seen);
   [[nodiscard]] SE3 predict_pose(std::int64_t utime) const;
   void project_view(const Frame& frame, const SE3& T_world_body, Among among,
                     std::vector<Candidate>* out) const;
@@ -85,7 +96,7 @@ class Tracker {
   PoseSolution pose_from_matches(const Frame& frame, const SE3& start);
   TrackOutcome fine_pose(const Frame& frame, const SE3& start);
   void count_sightings();
-  [[nodiscard]] double motion_since_reference(const Frame& frame, const SE3& T_world_body) const;
+  [[nodiscard]] double motion_since_reference(const Frame& frame, const SE3& T_world_body);
 
   const EstimatorConfig config_;
   StageListener* listener_ = nullptr;
@@ -98,17 +109,20 @@ class Tracker {
 
   std::vector<double> level_scale_;  // of each pyramid level
 
-  // Work space, reused.
+  // Work space, allocated at start for the largest view and the most features, and reused.
   std::vector<Candidate> candidates_;
   std::vector<Match> matches_;
   std::vector<std::int32_t> feature_match_;  // one a feature: index in matches_, or -1
   std::vector<PoseMeasurement> measurements_;
   std::vector<LandmarkHandle> last_seen_;      // inliers of the last accepted frame
   std::vector<std::uint8_t> seen_last_frame_;  // one a view landmark
-  std::vector<std::uint8_t> matched_;          // one a view landmark
-  std::vector<std::int32_t> candidate_of_;     // one a view landmark: index in candidates_, or -1
-  std::vector<std::uint32_t>
-      view_index_of_slot_;             // one a landmark slot of the map; valid where the view says so
+  std::vector<std::uint8_t> matched_;          // the same
+  std::vector<std::int32_t> candidate_of_;     // the same: index in candidates_, or -1
+  std::vector<double> motions_;
+  std::vector<Eigen::Vector3d> bearings_, points_;  // of relocalise()
+  PnpWorkspace pnp_;
+  // One a landmark slot of the map: index in the view; valid where the view says so.
+  std::vector<std::uint32_t> view_index_of_slot_;
   std::vector<SightingCount> counts_;  // one a landmark slot of the map
   std::vector<std::uint32_t> counted_slots_;
 };

@@ -56,6 +56,19 @@ TEST(CommandLine, NetworkAndBusWithoutAValueUseTheConfiguration) {
   EXPECT_EQ(o.can_interface, "");
 }
 
+TEST(CommandLine, ThreadsAndTheirRepetition) {
+  Options o = parse({"--replay", "run.lcm", "--speed", "1.5"}).options;
+  EXPECT_EQ(o.speed, 1.5);
+  EXPECT_EQ(o.schedule_log, "");
+  o = parse({"--replay", "run.lcm", "--schedule", "recorded"}).options;
+  EXPECT_FALSE(o.speed);
+  EXPECT_EQ(o.schedule_log, "run.lcm");
+  o = parse({"--replay", "run.lcm", "--schedule", "recorded", "--schedule-log", "live.lcm"}).options;
+  EXPECT_EQ(o.schedule_log, "live.lcm");
+  // The order is the recorded one, whatever the pace.
+  EXPECT_FALSE(parse({"--replay", "run.lcm", "--speed", "2", "--schedule", "recorded"}).options.speed);
+}
+
 TEST(CommandLine, HelpTeaches) {
   const std::string help = parse({"--help"}).text_and_leave;
   for (const char* word :
@@ -68,15 +81,18 @@ TEST(CommandLine, HelpTeaches) {
 
 TEST(CommandLineMistakes, SayWhatWasExpectedInOneLine) {
   EXPECT_EQ(error_of({}), "--replay LOG is missing; live cameras are not in this version (see --help)");
-  EXPECT_EQ(
-      error_of({"--replay", "run.lcm"}),
-      "--lockstep is missing: threaded replay is not in this version, expected --replay LOG --lockstep");
-  EXPECT_EQ(error_of({"--replay", "run.lcm", "--speed", "2"}),
-            "--speed: threaded replay is not in this version, expected --lockstep");
+  EXPECT_EQ(error_of({"--replay", "run.lcm"}),
+            "--lockstep, --speed X or --schedule recorded is missing, expected one of them");
+  for (const char* speed : {"0", "-1", "nan", "1001"}) {
+    EXPECT_EQ(error_of({"--replay", "run.lcm", "--speed", speed}),
+              "--speed: expected a number above 0, at most 1000");
+  }
   EXPECT_EQ(error_of({"--replay", "run.lcm", "--lockstep", "--speed", "2"}),
             "--lockstep and --speed exclude each other, expected one");
-  EXPECT_EQ(error_of({"--replay", "run.lcm", "--lockstep", "--schedule", "recorded"}),
-            "--schedule recorded: not in this version, expected --lockstep");
+  EXPECT_EQ(error_of({"--replay", "run.lcm", "--lockstep", "--schedule", "live"}),
+            "--schedule live: unknown, expected recorded");
+  EXPECT_EQ(error_of({"--replay", "run.lcm", "--lockstep", "--schedule-log", "live.lcm"}),
+            "--schedule-log without --schedule recorded, expected both");
   for (const auto& wrong : {error_of({"--replay", "run.lcm", "--lockstep", "--sped"}), error_of({"--replay"}),
                             error_of({"--replay", "run.lcm", "--lockstep", "stray"}),
                             error_of({"--replay", "a", "--replay", "b", "--lockstep"}),

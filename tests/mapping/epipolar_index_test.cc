@@ -93,7 +93,9 @@ TEST(EpipolarIndex, FindsWhatLookingAtEveryFeatureFinds) {
       q.ratio = trial % 2 == 0 ? 0.95F : 1.0F;
       const EpipolarMatch expected = by_hand(scene, q), actual = index.find(scene.set, q);
       ASSERT_EQ(actual.feature, expected.feature) << round << " " << trial;
-      if (expected.feature >= 0) EXPECT_EQ(actual.distance, expected.distance);
+      if (expected.feature >= 0) {
+        EXPECT_EQ(actual.distance, expected.distance);
+      }
       ++(expected.feature >= 0 ? found : none);
     }
   }

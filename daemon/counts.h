@@ -1,0 +1,19 @@
+// What came in, what was refused, and what could not be sent, since the start.
+#pragma once
+
+#include <cstdint>
+
+namespace farpoint::daemon {
+
+struct InputCounts {
+  std::int64_t images = 0;  // of all cameras
+  std::int64_t wrong_size = 0, undecodable = 0, unknown_camera = 0, times_backwards = 0;
+  std::int64_t messages_undecodable = 0, log_damages = 0;
+};
+
+// What could not be sent; the bus is counted here because its sink is no message sink.
+struct OutputCounts {
+  std::int64_t can_send_errors = 0;
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,47 @@
+// Everything that is published of a frame, in one order, on one thread; no heap call after the first frames.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/config.h"
+#include "daemon/frame_package.h"
+#include "daemon/map_board.h"
+#include "daemon/messages.h"
+#include "daemon/pose_sink.h"
+#include "daemon/publisher.h"
+
+namespace farpoint::daemon {
+
+class FrameReporter {
+ public:
+  struct Names {
+    std::string build, configuration_hash, calibration_hash;
+  };
+  // `sinks` get each frame in their order, then the publisher; all must outlive the reporter. with_schedule:
+  // FARPOINT_SCHEDULE is published too.
+  FrameReporter(const Config& config, const Names& names, std::vector<PoseSink*> sinks, Publisher* publisher,
+                MapBoard* maps, std::int64_t pool_bytes, bool with_schedule);
+
+  // Hands the frame to every sink. `package->clock` gets the time of the output.
+  const FrameOutput& report(FramePackage* package, const OutputCounts& out);
+
+ private:
+  void publish_status(const FramePackage& package, const OutputCounts& out);
+  void publish_schedule(const FramePackage& package);
+  void fill_status(const FramePackage& package, const OutputCounts& out);
+  void note_state(const slam::FrameResult& result);
+
+  const double status_rate_hz_, assumed_scale_;
+  const bool with_schedule_;
+  std::vector<PoseSink*> sinks_;
+  Publisher* publisher_;
+  MapBoard* maps_;
+
+  FrameOutput frame_;
+  status_t status_{};  // its texts are set once
+  slam::State last_state_ = slam::State::kStarting;
+  std::int64_t next_status_utime_;
+};
+
+}  // namespace farpoint::daemon

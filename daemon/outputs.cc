@@ -1,0 +1,91 @@
+#include "daemon/outputs.h"
+
+#include <spdlog/spdlog.h>
+
+namespace farpoint::daemon {
+
+Outputs::Outputs(const Options& options, const Config& config) : options_(options) {
+  try {
+    open_files(config);
+  } catch (const std::runtime_error& error) {
+    throw UsageError(error.what());
+  }
+  open_network(config);
+  open_bus(config);
+}
+
+std::vector<PoseSink*> Outputs::sinks() {
+  std::vector<PoseSink*> all;
+  if (can_) all.push_back(can_.get());
+  if (live_) all.push_back(live_.get());
+  return all;
+}
+
+std::vector<std::string> Outputs::close(const RunEnd& end) {
+  std::vector<std::string> written;
+  if (log_) {
+    log_->close();
+    written.push_back(options_.output);
+  }
+  if (!options_.trajectory.empty()) {
+    for (auto& path : write_final_trajectories(options_.trajectory, end.trajectories, end.unit_scale)) {
+      written.push_back(std::move(path));
+    }
+  }
+  if (live_) {
+    live_->close();
+    written.push_back(options_.live_trajectory);
+  }
+  if (can_) {
+    can_->close();
+    if (!options_.can_log.empty()) written.push_back(options_.can_log);
+  }
+  if (publisher_.network_errors() > 0) spdlog::warn("{} messages were not sent", publisher_.network_errors());
+  if (counts().can_send_errors > 0) spdlog::warn("{} CAN frames were not sent", counts().can_send_errors);
+  return written;
+}
+
+void Outputs::open_files(const Config& config) {
+  if (!options_.output.empty()) {
+    log_ = std::make_unique<ipc::LogWriter>(options_.output);
+    publisher_.add(std::make_unique<LogMessageSink>(log_.get()));
+  }
+  if (!options_.live_trajectory.empty()) live_ = std::make_unique<LiveTrajectory>(options_.live_trajectory);
+  if (!options_.can_log.empty()) {
+    make_can(config)->log_to(std::make_unique<ipc::CandumpWriter>(options_.can_log, bus_name(config)));
+  }
+  // Written at the end only: find out now whether that will be possible.
+  if (!options_.trajectory.empty()) ipc::ReplacedPath probe(options_.trajectory);
+}
+
+void Outputs::open_network(const Config& config) {
+  if (!options_.lcm_url) return;
+  const std::string url = options_.lcm_url->empty() ? config.lcm.url : *options_.lcm_url;
+  try {
+    publisher_.add(std::make_unique<LcmMessageSink>(url));
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; replay goes on without the network", error.what());
+  }
+}
+
+void Outputs::open_bus(const Config& config) {
+  if (!options_.can_interface) return;
+  try {
+    auto bus = std::make_unique<drivers::SocketCan>(bus_name(config));
+    make_can(config)->send_on(std::move(bus));
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; replay goes on without the bus", error.what());
+  }
+}
+
+CanSink* Outputs::make_can(const Config& config) {
+  if (!can_) can_ = std::make_unique<CanSink>(config.can.frame);
+  return can_.get();
+}
+
+std::string Outputs::bus_name(const Config& config) const {
+  const bool named = options_.can_interface && !options_.can_interface->empty();
+  return named ? *options_.can_interface : config.can.interface;
+}
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,46 @@
+// Everything that a replay writes or sends. Files appear when close() is called, else not at all.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/can_sink.h"
+#include "daemon/config.h"
+#include "daemon/counts.h"
+#include "daemon/messages.h"
+#include "daemon/options.h"
+#include "daemon/publisher.h"
+#include "daemon/trajectory_file.h"
+
+namespace farpoint::daemon {
+
+class Outputs {
+ public:
+  // Throws UsageError where a file cannot be written. A network or bus that cannot be used is only warned of.
+  Outputs(const Options& options, const Config& config);
+
+  // The bus first: it is what a controller waits for.
+  [[nodiscard]] std::vector<PoseSink*> sinks();
+  [[nodiscard]] Publisher* publisher() { return &publisher_; }
+  [[nodiscard]] OutputCounts counts() const { return {can_ ? can_->errors() : 0}; }
+
+  // Puts every file in its place; returns their names. Throws std::runtime_error where something was not
+  // stored. Warns of what was not sent.
+  std::vector<std::string> close(const RunEnd& end);
+
+ private:
+  void open_files(const Config& config);
+  void open_network(const Config& config);
+  void open_bus(const Config& config);
+  CanSink* make_can(const Config& config);
+  [[nodiscard]] std::string bus_name(const Config& config) const;
+
+  const Options& options_;
+  std::unique_ptr<ipc::LogWriter> log_;
+  std::unique_ptr<LiveTrajectory> live_;
+  std::unique_ptr<CanSink> can_;
+  Publisher publisher_;
+};
+
+}  // namespace farpoint::daemon

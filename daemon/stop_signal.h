@@ -1,0 +1,26 @@
+// SIGINT and SIGTERM end a replay between two frames, so that no temporary file is left behind.
+#pragma once
+
+#include <csignal>
+#include <stdexcept>
+
+namespace farpoint::daemon {
+
+class StopOnSignal {
+ public:
+  StopOnSignal();
+  ~StopOnSignal();
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+  // The signal that came, 0 for none.
+  [[nodiscard]] static int signal();
+  // Throws std::runtime_error where one came.
+  static void check();
+
+ private:
+  using Handler = void (*)(int);
+  Handler on_interrupt_, on_terminate_;
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,86 @@
+// What goes between tracking and mapping, and the fixed rings it goes through. Nobody waits on either side.
+//
+// Tracking sends jobs and, one a posed frame, where that frame stands. Mapping answers every job with one or
+// two replies, in order. What tracking does depends on the frames and on how many replies it has taken before
+// each of them, on nothing else of mapping: a list of these numbers is all that is needed to repeat a run.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/frame.h"
+#include "slam/map/local_view.h"
+#include "slam/mapping/statistics.h"
+#include "slam/spsc_ring.h"
+
+namespace farpoint::slam {
+
+enum class MappingJobKind : std::uint8_t {
+  kStartMap,    // from two views; one reply
+  kKeyframe,    // quick view, then full view
+  kPoseFrames,  // frames from before the map; one reply without a view
+  kDiscardMap,  // one reply without a view
+  kRetireMap,   // the same
+};
+
+struct MappingJob {
+  MappingJobKind kind = MappingJobKind::kKeyframe;
+  std::uint64_t number = 0;        // from 1
+  std::uint64_t frame_number = 0;  // of the frame that asked for it
+  std::int64_t utime = 0;          // of that frame
+  std::int32_t map_id = 0;
+  InitialPair pair;          // kStartMap
+  KeyframeRequest keyframe;  // kKeyframe
+  // kPoseFrames: the frames, the view to pose them against, and the landmarks that the newest frame saw.
+  std::vector<std::shared_ptr<Frame>> frames;
+  std::uint64_t last_before_map = 0;  // number of the second frame of the pair that began the map
+  std::shared_ptr<const LocalView> view;
+  std::vector<LandmarkHandle> seen;
+};
+
+enum class MappingStage : std::uint8_t {
+  kStarted,  // the first view of a map, or none: it did not hold
+  kQuick,    // new landmarks, poses not yet optimised
+  kFull,     // after local BA
+  kDone,     // no view: the job was of another kind, or the keyframe could not be used
+};
+
+struct MappingReply {
+  std::uint64_t number = 0;  // from 1
+  std::uint64_t job_number = 0;
+  std::uint64_t frame_number = 0;  // of the job
+  std::int64_t utime = 0;          // of the job
+  MappingStage stage = MappingStage::kDone;
+  bool ends_job = false;
+  std::shared_ptr<const LocalView> view;
+  MappingCounts counts;
+  std::uint32_t keyframes = 0, landmarks = 0;  // alive
+};
+
+// Where a frame was, relative to a keyframe, so that it follows the keyframe through every later
+// optimisation.
+struct RecordedFrame {
+  std::int64_t utime = 0;
+  std::int32_t map_id = 0;
+  std::uint64_t reference_id = 0;
+  SE3 T_reference_body;
+};
+
+struct Exchange {
+  // Jobs that may be under way at once. One keyframe at most, hence room for the rarer kinds.
+  static constexpr std::size_t kJobs = 4;
+  static constexpr std::size_t kReplies = 2 * kJobs;
+  // Frames tracked while mapping works on one job: far more than one job's time.
+  static constexpr std::size_t kRecords = 1024;
+
+  explicit Exchange(const EstimatorConfig& config);
+  [[nodiscard]] std::size_t bytes() const;
+
+  SpscRing<MappingJob> jobs;         // tracking -> mapping
+  SpscRing<MappingReply> replies;    // mapping -> tracking
+  SpscRing<RecordedFrame> recorded;  // tracking -> mapping
+};
+
+}  // namespace farpoint::slam

@@ -1,0 +1,19 @@
+// Counts this program's heap calls by thread, those of C libraries included.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace farpoint::test {
+
+// False where a sanitizer owns the heap: then nothing is counted.
+[[nodiscard]] bool heap_is_watched();
+// Counts from now on, from zero; a thread is told by its name when it first calls.
+void watch_heap();
+void stop_watching_heap();
+// malloc, calloc, realloc, aligned allocation, free and mmap by threads of this name while watched.
+[[nodiscard]] std::uint64_t heap_calls(const std::string& thread_name);
+// Where the first of them came from, to standard error.
+void print_heap_calls();
+
+}  // namespace farpoint::test
