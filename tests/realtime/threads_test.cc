@@ -17,8 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Faster than the camera, so that the test is short; frames may be dropped.
-constexpr double kSpeed = 4.0;
+// Faster than the camera, so that the test is short; frames may be dropped. Not for KITTI: a map that is lost
+// because mapping has no time to follow is looked for anew, and that may use the heap.
+constexpr double kFast = 4.0, kCameraSpeed = 1.0;
 
 fs::path data_folder() {
   return fs::path(FARPOINT_SOURCE_DIR).parent_path() / "shared" / "data";
@@ -32,10 +33,10 @@ std::string imported(const test::Scratch& scratch, const std::string& arguments)
   return std::system(command.c_str()) == 0 ? log : "";
 }
 
-Options threaded(const test::Scratch& scratch, const std::string& log) {
+Options threaded(const test::Scratch& scratch, const std::string& log, double speed = kFast) {
   Options options;
   options.replay = log;
-  options.speed = kSpeed;
+  options.speed = speed;
   options.output = scratch.path("out.lcm");
   options.trajectory = scratch.path("final.tum");
   options.live_trajectory = scratch.path("live.tum");
@@ -60,14 +61,14 @@ ThreadHooks watch_from_settled(bool* watched) {
   return hooks;
 }
 
-void expect_no_heap_calls(const std::string& recording) {
+void expect_no_heap_calls(const std::string& recording, double speed) {
   if (!fs::exists(data_folder())) GTEST_SKIP() << "no recordings in " << data_folder();
   if (!test::heap_is_watched()) GTEST_SKIP() << "a sanitizer owns the heap";
   const test::Scratch scratch;
   const std::string log = imported(scratch, recording);
   ASSERT_FALSE(log.empty());
   bool watched = false;
-  const int status = replay(threaded(scratch, log), quiet_config(), watch_from_settled(&watched));
+  const int status = replay(threaded(scratch, log, speed), quiet_config(), watch_from_settled(&watched));
   test::stop_watching_heap();
   EXPECT_EQ(status, 0);
   EXPECT_TRUE(watched);
@@ -83,11 +84,11 @@ void expect_no_heap_calls(const std::string& recording) {
 }
 
 TEST(RecordedThreads, NoHeapOnKittiAfterSettling) {
-  expect_no_heap_calls("kitti " + (data_folder() / "kitti").string() + " 03");
+  expect_no_heap_calls("kitti " + (data_folder() / "kitti").string() + " 03", kCameraSpeed);
 }
 
 TEST(RecordedThreads, NoHeapOnEurocAfterSettling) {
-  expect_no_heap_calls("euroc " + (data_folder() / "euroc" / "MH_01_part").string());
+  expect_no_heap_calls("euroc " + (data_folder() / "euroc" / "MH_01_part").string(), kFast);
 }
 
 TEST(RecordedThreads, APlantedMallocIsFound) {
