@@ -87,31 +87,37 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
   const Scene scene = shortened("straight", 150);
   const EstimatorConfig config = scene.estimator(LandmarkMode::kVmp);
   slam::EstimatorCounts before;
-  const RunReport r = run_scene(
-      scene, 3, config, [&](std::uint32_t frame, const slam::FrameResult&, const slam::Estimator& estimator) {
-        const slam::EstimatorCounts& c = estimator.counts();
-        EXPECT_GE(c.vmp_made, before.vmp_made);
-        EXPECT_GE(c.vmp_promoted, before.vmp_promoted);
-        EXPECT_GE(c.vmp_evicted, before.vmp_evicted);
-        before = c;
-        if (frame % 25 != 24) return;
-        std::uint64_t virtual_points = 0, all = 0;
-        for (const slam::LandmarkInfo& l : estimator.landmarks()) {
-          ++all;
-          virtual_points += l.full ? 0 : 1;
-          EXPECT_FALSE(l.through_vmp && !l.full);
-          EXPECT_GE(l.observations, 2);
-          EXPECT_GE(l.inverse_depth, 0.0);
-        }
-        EXPECT_EQ(all, c.landmarks);
-        EXPECT_LE(virtual_points, static_cast<std::uint64_t>(config.landmarks.max_bearing));
-        // No more are alive than were made and have not ended. (Fewer may be: a full landmark found on its
-        // corner takes a virtual one's place.)
-        EXPECT_LE(virtual_points + c.vmp_merged + c.vmp_promoted + c.vmp_rejected + c.vmp_evicted,
-                  c.vmp_made);
-        // The facade says how many are alive.
-        EXPECT_EQ(virtual_points, c.vmps) << "frame " << frame;
-      });
+  int compared = 0;
+  const RunReport r =
+      run_scene(scene, 3, config,
+                [&](std::uint32_t frame, const slam::FrameResult& result, const slam::Estimator& estimator) {
+                  const slam::EstimatorCounts& c = estimator.counts();
+                  EXPECT_GE(c.vmp_made, before.vmp_made);
+                  EXPECT_GE(c.vmp_promoted, before.vmp_promoted);
+                  EXPECT_GE(c.vmp_evicted, before.vmp_evicted);
+                  before = c;
+                  // Counts come with mapping's replies: they are of the map as it is where no job is under
+                  // way.
+                  if (frame < 20 || result.jobs_under_way > 0) return;
+                  ++compared;
+                  std::uint64_t virtual_points = 0, all = 0;
+                  for (const slam::LandmarkInfo& l : estimator.landmarks()) {
+                    ++all;
+                    virtual_points += l.full ? 0 : 1;
+                    EXPECT_FALSE(l.through_vmp && !l.full);
+                    EXPECT_GE(l.observations, 2);
+                    EXPECT_GE(l.inverse_depth, 0.0);
+                  }
+                  EXPECT_EQ(all, c.landmarks);
+                  EXPECT_LE(virtual_points, static_cast<std::uint64_t>(config.landmarks.max_bearing));
+                  // No more are alive than were made and have not ended. (Fewer may be: a full landmark found
+                  // on its corner takes a virtual one's place.)
+                  EXPECT_LE(virtual_points + c.vmp_merged + c.vmp_promoted + c.vmp_rejected + c.vmp_evicted,
+                            c.vmp_made);
+                  // The facade says how many are alive.
+                  EXPECT_EQ(virtual_points, c.vmps) << "frame " << frame;
+                });
+  EXPECT_GT(compared, 5);
   EXPECT_GT(r.counts.vmp_made, 300U);
   EXPECT_GT(r.counts.vmp_attached, 300U);
   EXPECT_GT(r.counts.vmp_merged, 0U);

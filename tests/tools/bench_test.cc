@@ -92,7 +92,7 @@ TEST(BenchReport, JsonHasThePromisedShape) {
   EXPECT_EQ(
       to_json(make_report({pass}, 1)).dump(),
       R"({"yardstick_ms":{"p50":12,"p99":14},"stages":{"tracking":{"p50_ms":6,"p99_ms":7,"max_ms":7,)"
-      R"("p50_yardsticks":0.5,"p99_yardsticks":0.5833333333},"process_cpu_yardsticks":3,"frames":100})");
+      R"("p50_yardsticks":0.5,"p99_yardsticks":0.5833333333}},"process_cpu_yardsticks":3,"frames":100})");
 }
 
 TEST(BenchReport, TextNamesEveryStageAndTheYardstick) {
