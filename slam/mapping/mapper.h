@@ -84,7 +84,7 @@ class Mapper {
   std::uint64_t newest_id_ = 0;
   std::uint64_t view_sequence_ = 0;
   std::size_t last_view_landmarks_ = 0;  // in the last view: about as many will be in the next
-  std::vector<LandmarkHandle> recent_;  // made not long ago, on probation
+  std::vector<LandmarkHandle> recent_;   // made not long ago, on probation
 
   // Settling: how much the last optimisations still changed the young map's unit.
   int steady_optimisations_ = 0;

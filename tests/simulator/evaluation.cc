@@ -26,7 +26,8 @@ struct Paths {
   std::vector<std::uint32_t> frames;
   std::vector<SE3> estimates, truths;
 
-  [[nodiscard]] std::vector<Vector3d> positions(const std::vector<SE3>& poses, std::size_t first, std::size_t last) const {
+  [[nodiscard]] std::vector<Vector3d> positions(const std::vector<SE3>& poses, std::size_t first,
+                                                std::size_t last) const {
     std::vector<Vector3d> out;
     for (std::size_t i = first; i < last; ++i) out.push_back(poses[i].t);
     return out;
@@ -40,7 +41,8 @@ struct Paths {
 Paths pair_up(const slam::MapTrajectory& trajectory, double rate_hz, Simulator* simulator) {
   Paths p;
   for (const slam::PosedFrame& f : trajectory.frames) {
-    p.frames.push_back(static_cast<std::uint32_t>(std::llround(static_cast<double>(f.utime) * 1e-6 * rate_hz)));
+    p.frames.push_back(
+        static_cast<std::uint32_t>(std::llround(static_cast<double>(f.utime) * 1e-6 * rate_hz)));
     p.estimates.push_back(f.T_map_body);
     p.truths.push_back(simulator->truth(p.frames.back()));
   }
@@ -51,7 +53,8 @@ Paths pair_up(const slam::MapTrajectory& trajectory, double rate_hz, Simulator* 
 double local_scale(const Paths& p, std::size_t i, double fallback) {
   constexpr double kReach_m = 20.0;
   std::size_t first = i, last = i;
-  for (double way = 0; first > 0 && way < kReach_m; --first) way += (p.truths[first].t - p.truths[first - 1].t).norm();
+  for (double way = 0; first > 0 && way < kReach_m; --first)
+    way += (p.truths[first].t - p.truths[first - 1].t).norm();
   for (double way = 0; last + 1 < p.truths.size() && way < kReach_m; ++last)
     way += (p.truths[last + 1].t - p.truths[last].t).norm();
   const slam::PointAlignment a = p.align(first, last + 1);
@@ -67,7 +70,8 @@ void compare_landmarks(const slam::Estimator& estimator, const slam::MapTrajecto
       ++report->phantoms;
       continue;
     }
-    if (l.creation_relative_sigma < 0.3) report->creation_depths_m.push_back(l.creation_depth * report->scale);
+    if (l.creation_relative_sigma < 0.3)
+      report->creation_depths_m.push_back(l.creation_depth * report->scale);
     const std::uint32_t frame = tag_frame(l.tag);
     const auto at = std::lower_bound(paths.frames.begin(), paths.frames.end(), frame);
     if (at == paths.frames.end() || *at != frame || !(l.inverse_depth_sigma > 0.0)) continue;
@@ -98,7 +102,8 @@ double quantile(std::vector<double> values, double p) {
 
 double RunReport::creation_share_beyond(double depth_m) const {
   if (creation_depths_m.empty()) return 0.0;
-  const auto n = std::count_if(creation_depths_m.begin(), creation_depths_m.end(), [&](double d) { return d > depth_m; });
+  const auto n = std::count_if(creation_depths_m.begin(), creation_depths_m.end(),
+                               [&](double d) { return d > depth_m; });
   return static_cast<double>(n) / static_cast<double>(creation_depths_m.size());
 }
 
@@ -108,7 +113,8 @@ double RunReport::vmp_share() const {
              : static_cast<double>(counts.vmp_promoted) / static_cast<double>(counts.landmarks_made);
 }
 
-RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::EstimatorConfig& config, const FrameHook& hook) {
+RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::EstimatorConfig& config,
+                    const FrameHook& hook) {
   RunReport report;
   Simulator simulator(scene, seed);
   slam::Estimator estimator(config, scene.believed_rig());

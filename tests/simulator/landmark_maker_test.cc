@@ -23,7 +23,7 @@ using slam::LandmarkState;
 using slam::SE3;
 
 constexpr double kFocal_px = 500.0;
-constexpr std::uint32_t kScaffold = 1000;    // ids of the scaffold's points begin here
+constexpr std::uint32_t kScaffold = 1000;  // ids of the scaffold's points begin here
 
 slam::Rig plain_rig() {
   slam::Camera::Parameters p;
@@ -34,13 +34,14 @@ slam::Rig plain_rig() {
   return rig;
 }
 
-// A point that keyframes see; which one of several that look alike, and on which level, may be chosen each time.
+// A point that keyframes see; which one of several that look alike, and on which level, may be chosen each
+// time.
 struct Corner {
   std::uint32_t id = 0;
   Vector3d position = Vector3d::Zero();
   int level = 0;
   std::uint32_t group = 0;
-  std::uint32_t look = 0;    // what the descriptor is made from; 0: the id
+  std::uint32_t look = 0;  // what the descriptor is made from; 0: the id
 };
 
 slam::Descriptor descriptor_of(const Corner& c) {
@@ -129,8 +130,9 @@ class LandmarkMakerTest : public ::testing::Test {
         scaffold_landmarks_[c.id] = h;
       } else {
         const slam::Feature& f = map_->keyframes()[keyframe].set.features[it->second];
-        ASSERT_TRUE(map_->add_observation(scaffold_landmarks_[c.id],
-                                          {keyframe, static_cast<std::int32_t>(it->second), {f.u_px, f.v_px}, 0.5F}));
+        ASSERT_TRUE(
+            map_->add_observation(scaffold_landmarks_[c.id],
+                                  {keyframe, static_cast<std::int32_t>(it->second), {f.u_px, f.v_px}, 0.5F}));
       }
     }
   }
@@ -152,8 +154,8 @@ class LandmarkMakerTest : public ::testing::Test {
 
   // Every VMP ever made is still one, was merged, promoted, rejected or evicted.
   void expect_balance() const {
-    EXPECT_EQ(counts_.vmp_made,
-              bearings() + counts_.vmp_merged + counts_.vmp_promoted + counts_.vmp_rejected + counts_.vmp_evicted);
+    EXPECT_EQ(counts_.vmp_made, bearings() + counts_.vmp_merged + counts_.vmp_promoted +
+                                    counts_.vmp_rejected + counts_.vmp_evicted);
   }
 
   const slam::Rig rig_ = plain_rig();
@@ -164,7 +166,8 @@ class LandmarkMakerTest : public ::testing::Test {
   std::unique_ptr<slam::LandmarkMaker> maker_;
   std::vector<Corner> scaffold_;
   std::map<std::uint32_t, LandmarkHandle> scaffold_landmarks_;
-  std::map<std::uint32_t, std::map<std::uint32_t, std::size_t>> features_;    // of a keyframe slot: point -> feature
+  std::map<std::uint32_t, std::map<std::uint32_t, std::size_t>>
+      features_;  // of a keyframe slot: point -> feature
   std::uint32_t frames_ = 0;
 };
 
@@ -209,7 +212,7 @@ TEST_F(LandmarkMakerTest, BaselineMakesNoVirtualPoints) {
   const KeyframeHandle a = look(0.0, {kFar, kNear}), b = look(1.0, {kFar, kNear});
   maker_->process(b, {a});
   EXPECT_EQ(landmark(b, kFar.id), nullptr);
-  ASSERT_NE(landmark(b, kNear.id), nullptr);    // 2.6 degrees of parallax
+  ASSERT_NE(landmark(b, kNear.id), nullptr);  // 2.6 degrees of parallax
   EXPECT_EQ(map_->landmarks().size(), slots + 1);
   // 10 m of base give the far point 1.43 degrees, enough for two views.
   const KeyframeHandle c = look(10.0, {kFar});
@@ -336,7 +339,7 @@ TEST_F(LandmarkMakerTest, SizeAgainstDepthRejects) {
   const KeyframeHandle b = look(SE3{Eigen::Quaterniond::Identity(), {2.0, 0.0, 4.0}}, {coarse});
   maker_->process(b, {a});
   const Landmark* right = landmark(b, kNear.id);
-  ASSERT_NE(right, nullptr);    // larger where it is nearer
+  ASSERT_NE(right, nullptr);  // larger where it is nearer
   EXPECT_NE(right->state, LandmarkState::kBearing);
 
   use(slam::LandmarkMode::kVmp);
@@ -408,7 +411,8 @@ TEST_F(LandmarkMakerTest, DepthsAreRightForTheirSigmaOverManyPoints) {
     std::vector<Corner> corners;
     for (std::uint32_t i = 0; i < 300; ++i) {
       const double depth_m = draw.log_uniform(10.0, 3000.0);
-      corners.push_back({10000 + i, depth_m * Vector3d(draw.uniform(-0.5, 0.5), draw.uniform(-0.4, 0.4), 1.0)});
+      corners.push_back(
+          {10000 + i, depth_m * Vector3d(draw.uniform(-0.5, 0.5), draw.uniform(-0.4, 0.4), 1.0)});
     }
     std::vector<KeyframeHandle> keyframes;
     for (int i = 0; i < 10; ++i) {
@@ -436,8 +440,8 @@ TEST_F(LandmarkMakerTest, DepthsAreRightForTheirSigmaOverManyPoints) {
   double outside = 0, square = 0;
   for (const double v : z) outside += std::fabs(v) > 1.96 ? 1.0 : 0.0, square += std::min(v * v, 25.0);
   outside /= static_cast<double>(z.size()), square /= static_cast<double>(z.size());
-  std::printf("normalised depth error: mean square %.3f, %.1f %% beyond 1.96 sigma, %zu points\n", square, 100 * outside,
-              z.size());
+  std::printf("normalised depth error: mean square %.3f, %.1f %% beyond 1.96 sigma, %zu points\n", square,
+              100 * outside, z.size());
   // Never overconfident; and not so careful that the sigma says nothing.
   EXPECT_LT(outside, 0.06);
   EXPECT_LT(square, 1.1);

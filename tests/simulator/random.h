@@ -1,5 +1,5 @@
-// Seeded randomness of the simulator. The standard fixes its engines' sequences but not its distributions', so
-// those are written out here: the same seed gives the same world with every compiler.
+// Seeded randomness of the simulator. The standard fixes its engines' sequences but not its distributions',
+// so those are written out here: the same seed gives the same world with every compiler.
 #pragma once
 
 #include <cmath>
@@ -53,7 +53,7 @@ class Draw {
   Engine engine_;
 };
 
-using WorldDraw = Draw<std::mt19937_64>;    // worlds and motions
-using SightingDraw = Draw<SplitMix>;        // noise of one sighting
+using WorldDraw = Draw<std::mt19937_64>;  // worlds and motions
+using SightingDraw = Draw<SplitMix>;      // noise of one sighting
 
 }  // namespace farpoint::sim

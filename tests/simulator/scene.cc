@@ -71,7 +71,7 @@ std::vector<Path::Segment> turns() {
   std::vector<Path::Segment> path;
   constexpr double kCurvature = 1.0 / 14.0;
   constexpr double kEase_m = 8.0;
-  const double arc_m = 0.5 * kPi / kCurvature - kEase_m;    // the two eases turn half as much a metre
+  const double arc_m = 0.5 * kPi / kCurvature - kEase_m;  // the two eases turn half as much a metre
   double side = 1.0;
   for (int i = 0; i < 4; ++i) {
     path.push_back({i == 0 ? 60.0 : 45.0, 0.0, 0.0});
@@ -184,11 +184,13 @@ Scene make_scene(const std::string& name) {
     s.layers = {all};
     return s;
   }
-  throw std::invalid_argument("scene '" + name + "': unknown; expected straight, highway, turning, hovering, rotating, "
+  throw std::invalid_argument("scene '" + name +
+                              "': unknown; expected straight, highway, turning, hovering, rotating, "
                               "endless or hover_start");
 }
 
-MotionModel::MotionModel(const Scene& scene, std::uint64_t seed) : motion_(scene.motion), speed_m_s_(scene.speed_m_s) {
+MotionModel::MotionModel(const Scene& scene, std::uint64_t seed)
+    : motion_(scene.motion), speed_m_s_(scene.speed_m_s) {
   WorldDraw draw(combine({seed, 0x6d6f74696f6eULL}));
   for (double& p : phase_) p = draw.uniform(0.0, 2.0 * kPi);
 }
@@ -212,7 +214,8 @@ SE3 MotionModel::T_world_body(double t_s, Path* path) const {
     return T;
   }
   if (motion_ == Motion::kRotation) {
-    const double yaw = 1.2 * (wave(0.06, 0) - std::sin(phase_[0])), pitch = 0.15 * wave(0.11, 1), roll = 0.1 * wave(0.09, 2);
+    const double yaw = 1.2 * (wave(0.06, 0) - std::sin(phase_[0])), pitch = 0.15 * wave(0.11, 1),
+                 roll = 0.1 * wave(0.09, 2);
     T.q = slam::so3_exp({0.0, 0.0, yaw}) * slam::so3_exp({0.0, pitch, 0.0}) * slam::so3_exp({roll, 0.0, 0.0});
     T.t << 0.0, 0.0, kCameraHeight_m;
     return T;
@@ -221,8 +224,11 @@ SE3 MotionModel::T_world_body(double t_s, Path* path) const {
   struct Knot {
     double t_s, x_m, y_m, z_m, yaw_rad;
   };
-  static const std::vector<Knot> kFlight{{0, 0, 0, 50, 0},       {5, 6, 0, 80, 0},        {13, 70, 10, 85, 0.15},
-                                         {19, 70, 10, 85, 1.4},  {30, 80, 90, 70, 1.5}};
+  static const std::vector<Knot> kFlight{{0, 0, 0, 50, 0},
+                                         {5, 6, 0, 80, 0},
+                                         {13, 70, 10, 85, 0.15},
+                                         {19, 70, 10, 85, 1.4},
+                                         {30, 80, 90, 70, 1.5}};
   static const std::vector<Knot> kHover{{0, 0, 0, 70, 0}, {6, 0, 0, 70, 0}, {15, 70, 10, 75, 0.2}};
   const std::vector<Knot>& knots = motion_ == Motion::kDrone ? kFlight : kHover;
   std::size_t i = 1;
@@ -231,7 +237,8 @@ SE3 MotionModel::T_world_body(double t_s, Path* path) const {
   const double x = std::clamp((t_s - a.t_s) / (b.t_s - a.t_s), 0.0, 1.0);
   const double share = x * x * (3.0 - 2.0 * x);
   const auto between = [share](double from, double to) { return from + share * (to - from); };
-  const double roll = 0.02 * wave(0.4, 1), pitch = 0.02 * wave(0.3, 2), yaw = between(a.yaw_rad, b.yaw_rad) + 0.01 * wave(0.2, 3);
+  const double roll = 0.02 * wave(0.4, 1), pitch = 0.02 * wave(0.3, 2),
+               yaw = between(a.yaw_rad, b.yaw_rad) + 0.01 * wave(0.2, 3);
   T.q = slam::so3_exp({0.0, 0.0, yaw}) * slam::so3_exp({0.0, pitch, 0.0}) * slam::so3_exp({roll, 0.0, 0.0});
   // Wind moves it by 0.15 m.
   T.t << between(a.x_m, b.x_m) + 0.15 * wave(0.25, 4), between(a.y_m, b.y_m) + 0.15 * wave(0.2, 5),

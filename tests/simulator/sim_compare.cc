@@ -1,5 +1,6 @@
 // Virtual map points against the baseline over simulated scenes, paired seed by seed.
-//   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--init-parallax RAD]
+//   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--init-parallax
+//   RAD]
 //               [--align-bias PX] [--focal-error SHARE] [--markdown] [--verbose]
 // The figures in the README come from `sim_compare --seeds 20 --scene all --markdown`.
 #include <cmath>
@@ -19,9 +20,9 @@ struct Options {
   int seeds = 20;
   std::uint64_t first = 1;
   std::string scene = "all";
-  int frames = 0;      // 0: the scene's own
+  int frames = 0;  // 0: the scene's own
   int features = 0;
-  double init_parallax_rad = 0;    // 0: the configuration's
+  double init_parallax_rad = 0;  // 0: the configuration's
   double align_bias_px = 0, focal_error = 0;
   bool markdown = false, verbose = false;
 };
@@ -59,8 +60,9 @@ Options parse(int argc, char** argv) {
     else if (key == "--verbose")
       o.verbose = true;
     else
-      throw std::invalid_argument(key + ": unknown; expected --seeds, --first, --scene, --frames, --features, "
-                                        "--init-parallax, --align-bias, --focal-error, --markdown or --verbose");
+      throw std::invalid_argument(key +
+                                  ": unknown; expected --seeds, --first, --scene, --frames, --features, "
+                                  "--init-parallax, --align-bias, --focal-error, --markdown or --verbose");
   }
   if (o.seeds < 1) throw std::invalid_argument("--seeds: at least 1 was expected");
   return o;
@@ -83,16 +85,22 @@ void print_run(const char* mode, std::uint64_t seed, const RunReport& r) {
   for (const LandmarkError& e : r.landmarks)
     if (e.true_depth_m > 50.0) far_errors.push_back(std::fabs(e.relative_error));
   std::fprintf(stderr,
-               "  seed %llu %-8s init %d posed %d/%d valid %d maps %llu lost %llu ate %.3f live %.3f m of %.0f | created %zu "
-               "p10 %.1f p50 %.1f p90 %.1f >50 %.1f%% >100 %.1f%% obs %.1f | vmp %.1f%% made %llu att %llu mrg %llu prom %llu rej "
-               "%llu evict %llu | made %llu culled %llu fused %llu phantoms %d | kf %llu -%llu | z local med %.2f |z| p50 %.2f "
-               "p95 %.2f, global |z| p50 %.2f p95 %.2f | far rel err p50 %.3f p90 %.3f | %.2f ms/frame, sim %.2f ms | scale",
-               static_cast<unsigned long long>(seed), mode, r.first_pose_frame, r.posed_frames, r.frames, r.valid_frames,
-               static_cast<unsigned long long>(r.counts.maps), static_cast<unsigned long long>(r.counts.lost), r.ate_m,
-               r.live_ate_m, r.path_m, r.creation_depths_m.size(), quantile(r.creation_depths_m, 0.1),
-               quantile(r.creation_depths_m, 0.5), quantile(r.creation_depths_m, 0.9), 100 * r.creation_share_beyond(50),
-               100 * r.creation_share_beyond(100), r.median_observation_m, 100 * r.vmp_share(),
-               static_cast<unsigned long long>(r.counts.vmp_made), static_cast<unsigned long long>(r.counts.vmp_attached),
+               "  seed %llu %-8s init %d posed %d/%d valid %d maps %llu lost %llu ate %.3f live %.3f m of "
+               "%.0f | created %zu "
+               "p10 %.1f p50 %.1f p90 %.1f >50 %.1f%% >100 %.1f%% obs %.1f | vmp %.1f%% made %llu att %llu "
+               "mrg %llu prom %llu rej "
+               "%llu evict %llu | made %llu culled %llu fused %llu phantoms %d | kf %llu -%llu | z local med "
+               "%.2f |z| p50 %.2f "
+               "p95 %.2f, global |z| p50 %.2f p95 %.2f | far rel err p50 %.3f p90 %.3f | %.2f ms/frame, sim "
+               "%.2f ms | scale",
+               static_cast<unsigned long long>(seed), mode, r.first_pose_frame, r.posed_frames, r.frames,
+               r.valid_frames, static_cast<unsigned long long>(r.counts.maps),
+               static_cast<unsigned long long>(r.counts.lost), r.ate_m, r.live_ate_m, r.path_m,
+               r.creation_depths_m.size(), quantile(r.creation_depths_m, 0.1),
+               quantile(r.creation_depths_m, 0.5), quantile(r.creation_depths_m, 0.9),
+               100 * r.creation_share_beyond(50), 100 * r.creation_share_beyond(100), r.median_observation_m,
+               100 * r.vmp_share(), static_cast<unsigned long long>(r.counts.vmp_made),
+               static_cast<unsigned long long>(r.counts.vmp_attached),
                static_cast<unsigned long long>(r.counts.vmp_merged),
                static_cast<unsigned long long>(r.counts.vmp_promoted),
                static_cast<unsigned long long>(r.counts.vmp_rejected),
@@ -102,9 +110,9 @@ void print_run(const char* mode, std::uint64_t seed, const RunReport& r) {
                static_cast<unsigned long long>(r.counts.landmarks_fused), r.phantoms,
                static_cast<unsigned long long>(r.counts.keyframes_made),
                static_cast<unsigned long long>(r.counts.keyframes_culled), quantile(local, 0.5),
-               quantile(magnitude(local), 0.5), quantile(magnitude(local), 0.95), quantile(magnitude(global), 0.5),
-               quantile(magnitude(global), 0.95), quantile(far_errors, 0.5), quantile(far_errors, 0.9),
-               1e3 * r.seconds / r.frames, 1e3 * r.simulator_seconds / r.frames);
+               quantile(magnitude(local), 0.5), quantile(magnitude(local), 0.95),
+               quantile(magnitude(global), 0.5), quantile(magnitude(global), 0.95), quantile(far_errors, 0.5),
+               quantile(far_errors, 0.9), 1e3 * r.seconds / r.frames, 1e3 * r.simulator_seconds / r.frames);
   for (const double s : r.scale_along) std::fprintf(stderr, " %.3f", s);
   std::fprintf(stderr, "\n");
 }
@@ -150,28 +158,34 @@ Row compare(const Options& o, const Scene& scene) {
       continue;
     }
     row.ratio.push_back(vmp.ate_m / baseline.ate_m);
-    row.depth_ratio.push_back(quantile(vmp.creation_depths_m, 0.9) / quantile(baseline.creation_depths_m, 0.9));
+    row.depth_ratio.push_back(quantile(vmp.creation_depths_m, 0.9) /
+                              quantile(baseline.creation_depths_m, 0.9));
   }
   return row;
 }
 
 void print_header(bool markdown) {
-  std::printf("%sscene | seeds | not compared | ATE m base | ATE m vmp | ATE ratio (quartiles) | p90 depth m base / vmp | "
-              "ratio (quartiles) | > 50 m %% | > 100 m %% | VMP %% | abs z p50 base / vmp | abs z p95 | ms a frame%s\n",
-              markdown ? "| " : "", markdown ? " |" : "");
+  std::printf(
+      "%sscene | seeds | not compared | ATE m base | ATE m vmp | ATE ratio (quartiles) | p90 depth m base / "
+      "vmp | "
+      "ratio (quartiles) | > 50 m %% | > 100 m %% | VMP %% | abs z p50 base / vmp | abs z p95 | ms a "
+      "frame%s\n",
+      markdown ? "| " : "", markdown ? " |" : "");
   if (markdown) std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
 }
 
 void print_row(const Options& o, const std::string& name, const Row& r) {
   const auto mid = [](const std::vector<double>& v) { return quantile(v, 0.5); };
-  std::printf("%s%s | %d | %d | %.3f | %.3f | %.3f (%.3f-%.3f) | %.1f / %.1f | %.2f (%.2f-%.2f) | %.1f / %.1f | %.1f / %.1f | "
-              "%.1f | %.2f / %.2f | %.2f / %.2f | %.1f / %.1f%s\n",
-              o.markdown ? "| " : "", name.c_str(), o.seeds, r.failed, mid(r.ate[0]), mid(r.ate[1]), mid(r.ratio),
-              quantile(r.ratio, 0.25), quantile(r.ratio, 0.75), mid(r.p90[0]), mid(r.p90[1]), mid(r.depth_ratio),
-              quantile(r.depth_ratio, 0.25), quantile(r.depth_ratio, 0.75), mid(r.beyond50[0]), mid(r.beyond50[1]),
-              mid(r.beyond100[0]), mid(r.beyond100[1]), mid(r.vmp[1]), quantile(magnitude(r.z[0]), 0.5),
-              quantile(magnitude(r.z[1]), 0.5), quantile(magnitude(r.z[0]), 0.95), quantile(magnitude(r.z[1]), 0.95),
-              mid(r.ms[0]), mid(r.ms[1]), o.markdown ? " |" : "");
+  std::printf(
+      "%s%s | %d | %d | %.3f | %.3f | %.3f (%.3f-%.3f) | %.1f / %.1f | %.2f (%.2f-%.2f) | %.1f / %.1f | %.1f "
+      "/ %.1f | "
+      "%.1f | %.2f / %.2f | %.2f / %.2f | %.1f / %.1f%s\n",
+      o.markdown ? "| " : "", name.c_str(), o.seeds, r.failed, mid(r.ate[0]), mid(r.ate[1]), mid(r.ratio),
+      quantile(r.ratio, 0.25), quantile(r.ratio, 0.75), mid(r.p90[0]), mid(r.p90[1]), mid(r.depth_ratio),
+      quantile(r.depth_ratio, 0.25), quantile(r.depth_ratio, 0.75), mid(r.beyond50[0]), mid(r.beyond50[1]),
+      mid(r.beyond100[0]), mid(r.beyond100[1]), mid(r.vmp[1]), quantile(magnitude(r.z[0]), 0.5),
+      quantile(magnitude(r.z[1]), 0.5), quantile(magnitude(r.z[0]), 0.95), quantile(magnitude(r.z[1]), 0.95),
+      mid(r.ms[0]), mid(r.ms[1]), o.markdown ? " |" : "");
   std::fflush(stdout);
 }
 

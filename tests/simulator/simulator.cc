@@ -13,8 +13,8 @@ using slam::SE3;
 namespace {
 
 // As the real extractor and alignment have them.
-constexpr int kCornerBorder_px = 19;     // level pixels
-constexpr float kAlignBorder_px = 6;     // level pixels
+constexpr int kCornerBorder_px = 19;  // level pixels
+constexpr float kAlignBorder_px = 6;  // level pixels
 constexpr float kMaxScaleChange = 2.2F;
 constexpr int kCell_px = 60;
 
@@ -25,7 +25,8 @@ static_assert(offsetof(PatchPayload, point) == 0 && offsetof(PatchPayload, frame
 
 }  // namespace
 
-// ------------------------------------------------------------------------------------------------------------- image
+// -------------------------------------------------------------------------------------------------------------
+// image
 
 SimImage::SimImage(const Options& options, std::uint32_t frame, std::vector<Projection> visible,
                    std::vector<PatchPayload> features)
@@ -38,9 +39,13 @@ SimImage::SimImage(const Options& options, std::uint32_t frame, std::vector<Proj
   ++images_alive;
 }
 
-SimImage::~SimImage() { --images_alive; }
+SimImage::~SimImage() {
+  --images_alive;
+}
 
-int SimImage::alive() { return images_alive; }
+int SimImage::alive() {
+  return images_alive;
+}
 
 bool SimImage::extract_patch(const slam::FeatureSet& set, std::size_t index, slam::Patch* patch) const {
   if (index >= features_.size() || index >= set.features.size()) return false;
@@ -50,8 +55,8 @@ bool SimImage::extract_patch(const slam::FeatureSet& set, std::size_t index, sla
   return true;
 }
 
-const SimImage::Projection* SimImage::find(const PatchPayload& host, const Eigen::Vector2f& expected, float reach,
-                                           bool alike) const {
+const SimImage::Projection* SimImage::find(const PatchPayload& host, const Eigen::Vector2f& expected,
+                                           float reach, bool alike) const {
   const Projection* best = nullptr;
   float best_distance = reach;
   const auto consider = [&](const Projection& p) {
@@ -68,8 +73,8 @@ const SimImage::Projection* SimImage::find(const PatchPayload& host, const Eigen
   return best;
 }
 
-slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& A, const Eigen::Vector2f& predicted_px,
-                                float max_shift_px) const {
+slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& A,
+                                const Eigen::Vector2f& predicted_px, float max_shift_px) const {
   slam::Alignment out;
   PatchPayload payload;
   std::memcpy(&payload, host.pixels.data(), sizeof(payload));
@@ -77,8 +82,9 @@ slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& 
   if (!(determinant > 1e-4F)) return out;
   const double host_scale = std::pow(options_.scale_factor, host.level);
   const double size = host_scale * std::sqrt(static_cast<double>(determinant));
-  const int level = std::clamp(static_cast<int>(std::lround(std::log(size) / std::log(options_.scale_factor))), 0,
-                               options_.levels - 1);
+  const int level =
+      std::clamp(static_cast<int>(std::lround(std::log(size) / std::log(options_.scale_factor))), 0,
+                 options_.levels - 1);
   const auto scale = static_cast<float>(std::pow(options_.scale_factor, level));
   const float change = static_cast<float>(size) / scale;
   if (change > kMaxScaleChange || change < 1.0F / kMaxScaleChange) return out;
@@ -110,16 +116,19 @@ slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& 
   return out;
 }
 
-// --------------------------------------------------------------------------------------------------------- simulator
+// ---------------------------------------------------------------------------------------------------------
+// simulator
 
 Simulator::Simulator(const Scene& scene, std::uint64_t seed)
     : scene_(scene),
       seed_(seed),
       rig_(scene.rig()),
       motion_(scene, seed),
-      world_(scene.layers, Path(scene.path, scene.beyond, combine({seed, 0x70617468ULL})), scene.repetition, seed) {
+      world_(scene.layers, Path(scene.path, scene.beyond, combine({seed, 0x70617468ULL})), scene.repetition,
+             seed) {
   const slam::PyramidOptions pyramid;
-  image_ = {scene.noise, pyramid.scale_factor, pyramid.levels, scene.camera.width_px, scene.camera.height_px, seed};
+  image_ = {scene.noise,           pyramid.scale_factor,   pyramid.levels,
+            scene.camera.width_px, scene.camera.height_px, seed};
 }
 
 std::int64_t Simulator::utime(std::uint32_t frame) const {
@@ -149,7 +158,8 @@ bool Simulator::hidden(std::uint32_t point, double t_s) const {
   return draw.chance(scene_.noise.occlusion);
 }
 
-bool Simulator::project(const WorldPoint& p, const SE3& T_camera_world, Eigen::Vector2d* pixel, double* level) const {
+bool Simulator::project(const WorldPoint& p, const SE3& T_camera_world, Eigen::Vector2d* pixel,
+                        double* level) const {
   const Eigen::Vector3d c = T_camera_world * p.position;
   if (c.z() < 0.5) return false;
   const double distance = c.norm();
@@ -228,9 +238,11 @@ Sighted Simulator::look(std::uint32_t frame, const SE3& T_world_body, double s_m
     Feature f;
     f.level = static_cast<std::uint8_t>(c.level);
     const double u = c.pixel.x() + sigma * draw.normal(), v = c.pixel.y() + sigma * draw.normal();
-    if (!snap(u, c.level, scene_.camera.width_px, &f.u_px) || !snap(v, c.level, scene_.camera.height_px, &f.v_px))
+    if (!snap(u, c.level, scene_.camera.width_px, &f.u_px) ||
+        !snap(v, c.level, scene_.camera.height_px, &f.v_px))
       continue;
-    f.angle_rad = angle(static_cast<double>(c.point->angle_rad + roll) + noise.angle_sigma_rad * draw.normal());
+    f.angle_rad =
+        angle(static_cast<double>(c.point->angle_rad + roll) + noise.angle_sigma_rad * draw.normal());
     f.score = 100.0F * c.score;
     slam::Descriptor d = c.point->descriptor;
     for (auto& word : d.words) {
@@ -254,7 +266,8 @@ Sighted Simulator::look(std::uint32_t frame, const SE3& T_world_body, double s_m
     f.score = 50.0F;
     slam::Descriptor d;
     for (auto& word : d.words) word = draw.bits();
-    if (!snap(u, level, scene_.camera.width_px, &f.u_px) || !snap(v, level, scene_.camera.height_px, &f.v_px)) continue;
+    if (!snap(u, level, scene_.camera.width_px, &f.u_px) || !snap(v, level, scene_.camera.height_px, &f.v_px))
+      continue;
     set.features.push_back(f);
     set.descriptors.push_back(d);
     payloads.push_back({kNothing | i, frame, 0.0F, 0.0F, 0});

@@ -1,4 +1,5 @@
-// Turns a scene into what the image processing would have handed to the estimator, frame by frame, with the truth.
+// Turns a scene into what the image processing would have handed to the estimator, frame by frame, with the
+// truth.
 #pragma once
 
 #include <memory>
@@ -12,18 +13,22 @@ namespace farpoint::sim {
 
 // What a host patch carries instead of pixels. Its first eight bytes are LandmarkInfo.tag.
 struct PatchPayload {
-  std::uint32_t point = 0;       // id of the true point; kNothing and above: an outlier
-  std::uint32_t frame = 0;       // in which the patch was cut: where the landmark is anchored
-  float du_px = 0, dv_px = 0;    // corner as measured minus true projection
+  std::uint32_t point = 0;     // id of the true point; kNothing and above: an outlier
+  std::uint32_t frame = 0;     // in which the patch was cut: where the landmark is anchored
+  float du_px = 0, dv_px = 0;  // corner as measured minus true projection
   std::uint32_t group = 0;
 };
 constexpr std::uint32_t kNothing = 0xE0000000U;
 
-[[nodiscard]] inline std::uint32_t tag_point(std::uint64_t tag) { return static_cast<std::uint32_t>(tag); }
-[[nodiscard]] inline std::uint32_t tag_frame(std::uint64_t tag) { return static_cast<std::uint32_t>(tag >> 32); }
+[[nodiscard]] inline std::uint32_t tag_point(std::uint64_t tag) {
+  return static_cast<std::uint32_t>(tag);
+}
+[[nodiscard]] inline std::uint32_t tag_frame(std::uint64_t tag) {
+  return static_cast<std::uint32_t>(tag >> 32);
+}
 
-// The pixels behind a simulated frame: knows where every visible point projects, so that alignment measures what real
-// alignment would have measured.
+// The pixels behind a simulated frame: knows where every visible point projects, so that alignment measures
+// what real alignment would have measured.
 class SimImage final : public slam::FrameImage {
  public:
   struct Projection {
@@ -45,9 +50,10 @@ class SimImage final : public slam::FrameImage {
   SimImage& operator=(const SimImage&) = delete;
   // Images somebody still holds.
   [[nodiscard]] static int alive();
-  [[nodiscard]] bool extract_patch(const slam::FeatureSet& set, std::size_t index, slam::Patch* patch) const override;
-  // True projection + A * (host corner's offset from its true projection) + noise. Not ok where the point is hidden, out
-  // of reach, too much larger or smaller than in the host, or, now and then, for no reason.
+  [[nodiscard]] bool extract_patch(const slam::FeatureSet& set, std::size_t index,
+                                   slam::Patch* patch) const override;
+  // True projection + A * (host corner's offset from its true projection) + noise. Not ok where the point is
+  // hidden, out of reach, too much larger or smaller than in the host, or, now and then, for no reason.
   [[nodiscard]] slam::Alignment align(const slam::Patch& host, const Eigen::Matrix2f& A_target_host,
                                       const Eigen::Vector2f& predicted_px, float max_shift_px) const override;
 
@@ -57,9 +63,9 @@ class SimImage final : public slam::FrameImage {
 
   Options options_;
   std::uint32_t frame_;
-  std::vector<Projection> visible_;                    // by point
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> groups_;    // (group, index in visible_), sorted
-  std::vector<PatchPayload> features_;                 // one a feature
+  std::vector<Projection> visible_;                              // by point
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> groups_;  // (group, index in visible_), sorted
+  std::vector<PatchPayload> features_;                           // one a feature
 };
 
 struct Sighted {
@@ -103,7 +109,7 @@ class Simulator {
   World world_;
   SimImage::Options image_;
   std::uint32_t frame_ = 0;
-  std::unordered_map<std::uint32_t, Eigen::Vector3d> positions_;    // cache of position()
+  std::unordered_map<std::uint32_t, Eigen::Vector3d> positions_;  // cache of position()
 };
 
 }  // namespace farpoint::sim

@@ -147,7 +147,9 @@ TEST(Simulator, EndlessWorldTakesNoEndlessMemory) {
   }
 }
 
-TEST(Simulator, UnknownSceneSaysWhatWasExpected) { EXPECT_THROW((void)make_scene("moon"), std::invalid_argument); }
+TEST(Simulator, UnknownSceneSaysWhatWasExpected) {
+  EXPECT_THROW((void)make_scene("moon"), std::invalid_argument);
+}
 
 TEST(Evaluation, Quantiles) {
   EXPECT_EQ(quantile({3, 1, 2}, 0.5), 2.0);

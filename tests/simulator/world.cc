@@ -13,8 +13,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kStretchOffset = 1 << 13;
 
 std::uint32_t make_id(std::size_t layer, int stretch, std::size_t number) {
-  return (static_cast<std::uint32_t>(layer) << 29) | (static_cast<std::uint32_t>(stretch + kStretchOffset) << 15) |
-         static_cast<std::uint32_t>(number);
+  return (static_cast<std::uint32_t>(layer) << 29) |
+         (static_cast<std::uint32_t>(stretch + kStretchOffset) << 15) | static_cast<std::uint32_t>(number);
 }
 
 // One bit in 16 differs.
@@ -56,7 +56,8 @@ void Path::extend(double s_m) {
     Node next;
     const double turn = 0.5 * (n.curvature + curvature) * kNodeSpacing_m;
     const double middle = n.place.heading_rad + 0.5 * turn;
-    next.place.position = n.place.position + kNodeSpacing_m * Eigen::Vector2d(std::cos(middle), std::sin(middle));
+    next.place.position =
+        n.place.position + kNodeSpacing_m * Eigen::Vector2d(std::cos(middle), std::sin(middle));
     next.place.heading_rad = n.place.heading_rad + turn;
     next.curvature = curvature;
     nodes_.push_back(next);
@@ -77,7 +78,8 @@ Path::Place Path::at(double s_m) {
   const double rest = s_m / kNodeSpacing_m - static_cast<double>(index);
   const Place& a = nodes_[index].place;
   const Place& b = nodes_[index + 1].place;
-  return {a.position + rest * (b.position - a.position), a.heading_rad + rest * (b.heading_rad - a.heading_rad)};
+  return {a.position + rest * (b.position - a.position),
+          a.heading_rad + rest * (b.heading_rad - a.heading_rad)};
 }
 
 World::World(std::vector<Layer> layers, Path path, double repetition, std::uint64_t seed)
