@@ -21,6 +21,7 @@
 #include "farpoint/map_t.hpp"
 #include "farpoint/odometry_t.hpp"
 #include "farpoint/pose_t.hpp"
+#include "farpoint/simulation_t.hpp"
 #include "farpoint/status_t.hpp"
 #include "farpoint/summary_t.hpp"
 #include "farpoint/timing_t.hpp"
@@ -52,6 +53,8 @@ template <>
 inline constexpr std::string_view kLayout<odometry_t> = "24 24 32 24 24 288 288 6 8";
 template <>
 inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
+template <>
+inline constexpr std::string_view kLayout<simulation_t> = "8 4 sss 8 8 4 4 1";
 template <>
 inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 40 64 24 16 8 24 8 ssss";
 template <>
