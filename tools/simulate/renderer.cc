@@ -613,8 +613,6 @@ class Renderer::Impl {
   Eigen::Matrix3f R_view_world_;
   int first_row_ = 0, last_row_ = 0;
   std::vector<float> edge_left_, edge_right_;
-
-  friend class Renderer;
 };
 
 double sway_at(double time_s, double phase) {

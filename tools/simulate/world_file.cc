@@ -271,15 +271,19 @@ void check_street_corners(const YamlSection& top, const WorldDescription& world)
   }
   if (!world.town) top.fail("drive", "street_corners are given, expected a section 'town' with the streets");
   if (corners.size() < 3) top.fail("drive", "expected at least 3 street_corners: the way is closed");
+  const auto pair = [](std::size_t i) { return "street_corners, pair " + std::to_string(i + 1) + ": "; };
+  const auto columns = static_cast<int>(world.town->columns_m.size()),
+             rows = static_cast<int>(world.town->rows_m.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Eigen::Vector2i& c = corners[i];
+    const bool is_inside = c.x() >= 0 && c.y() >= 0 && c.x() < columns && c.y() < rows;
+    if (!is_inside) top.fail("drive", pair(i) + "expected a column and row of the town, counted from 0");
+  }
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Eigen::Vector2i &a = corners[i], &b = corners[(i + 1) % corners.size()];
-    const std::string which = "street_corners, pair " + std::to_string(i + 1) + ": ";
-    if (a.x() < 0 || a.y() < 0 || a.x() >= static_cast<int>(world.town->columns_m.size()) ||
-        a.y() >= static_cast<int>(world.town->rows_m.size())) {
-      top.fail("drive", which + "expected a column and row of the town, counted from 0");
+    if ((a.x() == b.x()) == (a.y() == b.y())) {
+      top.fail("drive", pair(i) + "expected the next corner on the same column or row, and another place");
     }
-    if ((a.x() == b.x()) == (a.y() == b.y()))
-      top.fail("drive", which + "expected the next corner on the same column or row, and another place");
   }
 }
 
