@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kNormals = std::size_t{1} << 14;
 constexpr int kToneSteps = 4096;
 // A sunny scene's mean radiance is exposed to this share of the full well: middle grey after the tone curve.
-constexpr double kTargetShare = 0.16;
+constexpr double kTargetShare = 0.30;
 constexpr double kUsualRadiance = 0.30;
 
 }  // namespace

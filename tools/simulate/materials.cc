@@ -92,7 +92,7 @@ MaterialLibrary::MaterialLibrary(std::uint64_t seed)
     : seed_(seed_of(seed, "materials")), materials_(kMaterialCount) {
   const std::uint64_t grain_seed = seed_of(seed_, "grain");
   grain_ = add(Texture(256, 256, [=](double u, double v) {
-    return 0.5 + 0.28 * periodic_fractal(grain_seed, 12 * u, 12 * v, 12, 5, 0.85);
+    return 0.5 + 0.5 * periodic_fractal(grain_seed, 12 * u, 12 * v, 12, 5, 0.85);
   }));
   add_ground();
   add_roads();

@@ -48,7 +48,7 @@ void MeshBuilder::quad(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const
   face.corners = {a.cast<float>(), b.cast<float>(), c.cast<float>(), d.cast<float>()};
   face.count = 4;
   const Eigen::Vector3d normal = (c - a).cross(d - b).normalized();
-  const Eigen::Vector3d s = (b - a).normalized(), t = normal.cross(s);
+  const Eigen::Vector3d s = paint.texture_scale * (b - a).normalized(), t = normal.cross(s);
   face.normal = normal.cast<float>();
   face.s_axis = s.cast<float>();
   face.t_axis = t.cast<float>();
@@ -63,7 +63,7 @@ void MeshBuilder::triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, c
   face.corners = {a.cast<float>(), b.cast<float>(), c.cast<float>(), c.cast<float>()};
   face.count = 3;
   const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
-  const Eigen::Vector3d s = (b - a).normalized(), t = normal.cross(s);
+  const Eigen::Vector3d s = paint.texture_scale * (b - a).normalized(), t = normal.cross(s);
   face.normal = normal.cast<float>();
   face.s_axis = s.cast<float>();
   face.t_axis = t.cast<float>();

@@ -82,7 +82,8 @@ class MeshBuilder {
     double brightness = 1.0;
     bool two_sided = false;
     bool lit_by_map = false;
-    double fixed_light = -1.0;  // light that does not follow from the normal; negative: it does
+    double fixed_light = -1.0;   // light that does not follow from the normal; negative: it does
+    double texture_scale = 1.0;  // metres of texture a metre of face
   };
   // Quadrilateral a b c d, counter-clockwise seen from outside; s runs from a to b and starts at s_m, t
   // across it, upwards on walls, and starts at t_m. It must be flat, or nearly.

@@ -16,14 +16,15 @@ constexpr double kFoundation_m = 1.5;
 
 using Paint = MeshBuilder::Paint;
 
-// A picture of foliage standing in the world: `across` and `up` are its half sides.
+// A picture of foliage standing in the world: `across` and `up` are its half sides. It shows the whole
+// texture.
 void add_card(MeshBuilder* builder, const Eigen::Vector3d& centre, const Eigen::Vector3d& across,
               const Eigen::Vector3d& up, const Paint& paint) {
-  // The texture's 4 m are stretched over the card by way of its coordinates only where the card has that
-  // size; elsewhere the card shows a part of it, or repeats it.
-  const double s = 2.0 - across.norm(), t = 2.0 - up.norm();
-  builder->quad(centre - across - up, centre + across - up, centre + across + up, centre - across + up, paint,
-                s, t);
+  constexpr double kTexture_m = 4.0;
+  Paint scaled = paint;
+  scaled.texture_scale = kTexture_m / (2.0 * across.norm());
+  builder->quad(centre - across - up, centre + across - up, centre + across + up, centre - across + up,
+                scaled);
 }
 
 // A post with square section.
@@ -61,7 +62,7 @@ void add_tree(MeshBuilder* builder, const Spot& spot, double height_m, TreeDetai
                    up = random->uniform(-0.75, 0.8);
       const double out = 0.55 * std::sqrt(1.0 - up * up) * crown * 0.8;
       centre += Eigen::Vector3d(out * std::cos(around), out * std::sin(around), up * crown * 0.75);
-      size = std::min(2.0, 0.62 * crown);
+      size = std::min(2.3, 0.7 * crown);
     }
     const double yaw =
         kPi * (i + random->uniform(0.0, 0.7)) / cards * (detail == TreeDetail::kNear ? 5.0 : 1.0);

@@ -15,7 +15,7 @@ struct Sky {
   const Texture* cloud_detail = nullptr;
   double height_m = 1500.0;  // above the world's zero
   double period_m = 6000.0, detail_period_m = 700.0;
-  double radiance = 1.0;
+  double radiance = 1.7;
   Eigen::Vector2d wind_mps = Eigen::Vector2d::Zero();
 };
 
@@ -26,7 +26,7 @@ struct Scene {
   std::function<void(double time_s, std::vector<MovingObject>* objects)> moving_at;
   Sky sky;
   double visibility_m = 20000.0;  // distance after which the share exp(-1) of light arrives
-  double haze_radiance = 0.8;
+  double haze_radiance = 1.0;
   Eigen::Vector3d sway_direction = Eigen::Vector3d::UnitX();  // of foliage in the wind
 };
 

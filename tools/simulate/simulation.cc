@@ -158,7 +158,7 @@ void Simulation::place_traffic(double time_s, std::vector<MovingObject>* objects
   };
   Random random(seed_of(seed_, "traffic"));
   for (int i = 0; i < traffic.cars_ahead; ++i) {
-    const double gap = 22.0 + 38.0 * i + random.uniform(0.0, 14.0), phase = random.uniform(0.0, 6.28);
+    const double gap = 30.0 + 38.0 * i + random.uniform(0.0, 14.0), phase = random.uniform(0.0, 6.28);
     place(here + gap + 6.0 * std::sin(0.15 * time_s + phase), lane + 0.15 * std::sin(0.2 * time_s + phase),
           false, static_cast<std::size_t>(i));
   }

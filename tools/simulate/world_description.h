@@ -67,7 +67,7 @@ struct SkyDescription {
   double wind_mps = 12.0, wind_direction_rad = 0.6;
   double sun_azimuth_rad = 2.2, sun_elevation_rad = 0.7;
   double visibility_m = 20000.0;
-  double ambient = 0.45;  // brightness of what the sun does not reach, of full light
+  double ambient = 0.30;  // brightness of what the sun does not reach, of full light
 };
 
 struct DriveDescription {
@@ -101,7 +101,7 @@ struct CameraDescription {
 };
 
 struct SensorDescription {
-  double exposure_s = 0.004;      // where the scene is as bright as a sunny day's mean
+  double exposure_s = 0.003;      // where the scene is as bright as a sunny day's mean
   double max_exposure_s = 0.012;  // beyond it gain helps
   double adaptation_s = 0.4;      // time constant of the automatic exposure
   double full_well = 12000.0;     // electrons at 255
