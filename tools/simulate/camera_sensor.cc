@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kNormals = std::size_t{1} << 14;
 constexpr int kToneSteps = 4096;
 // A sunny scene's mean radiance is exposed to this share of the full well: middle grey after the tone curve.
-constexpr double kTargetShare = 0.30;
+constexpr double kTargetShare = 0.26;
 constexpr double kUsualRadiance = 0.30;
 
 }  // namespace
@@ -60,6 +60,8 @@ void CameraSensor::expose(const std::vector<float>& radiance, const Exposure& ex
   const auto read = static_cast<float>(std::pow(exposure.gain * d_.read_noise / d_.full_well, 2));
   const auto factor = static_cast<float>(per_radiance);
   Random random(seed_at(seed_, static_cast<std::int64_t>(frames_++), 1));
+  // Metered below the upper third: vehicles' cameras leave the sky out, and let it burn out.
+  const std::size_t metered_from = fall_off_.size() / 3;
   double sum = 0.0;
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i < fall_off_.size(); ++i, bits >>= 14) {
@@ -68,9 +70,9 @@ void CameraSensor::expose(const std::vector<float>& radiance, const Exposure& ex
     const float noisy = share + std::sqrt(share * shot + read) * normal_[bits & (kNormals - 1)];
     const int step = static_cast<int>(std::clamp(noisy, 0.0F, 1.0F) * kToneSteps + 0.5F);
     grey[i] = tone_curve_[static_cast<std::size_t>(step)];
-    sum += std::min(share, 1.0F);
+    if (i >= metered_from) sum += std::min(share, 1.0F);
   }
-  const double mean = sum / static_cast<double>(fall_off_.size()) / jump_at(time_s);
+  const double mean = sum / static_cast<double>(fall_off_.size() - metered_from) / jump_at(time_s);
   const double wanted = level_ * kTargetShare / std::max(mean, 1e-4);
   // The first image is metered at once: cameras are switched on before recordings begin.
   const double share = has_metered_ ? 1.0 - std::exp(-frame_interval_s / d_.adaptation_s) : 1.0;

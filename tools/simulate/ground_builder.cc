@@ -84,6 +84,7 @@ void add_skirt(const ChunkSite& chunk, const HeightGrid& grid, double depth_m) {
   paint.material = kGround;
   paint.fixed_light = 0.8;
   paint.two_sided = true;
+  paint.lit_by_map = true;  // and casts no shadow
   chunk.builder->begin_cluster();
   for (int i = 0; i < n; ++i) {
     for (const auto& [a, b] :

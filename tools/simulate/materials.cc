@@ -92,7 +92,7 @@ MaterialLibrary::MaterialLibrary(std::uint64_t seed)
     : seed_(seed_of(seed, "materials")), materials_(kMaterialCount) {
   const std::uint64_t grain_seed = seed_of(seed_, "grain");
   grain_ = add(Texture(256, 256, [=](double u, double v) {
-    return 0.5 + 0.5 * periodic_fractal(grain_seed, 12 * u, 12 * v, 12, 5, 0.85);
+    return 0.5 + 0.42 * periodic_fractal(grain_seed, 5 * u, 5 * v, 5, 6, 0.85);
   }));
   add_ground();
   add_roads();
@@ -144,11 +144,11 @@ void MaterialLibrary::add_ground() {
   const Texture* meadow = add(Texture(512, 512, [=](double u, double v) {
     const double tufts = periodic_fractal(seed + 50, 16 * u, 16 * v, 16, 6, 0.8);
     const Cells herbs = periodic_cells(seed + 51, 40 * u, 40 * v, 40);
-    return 0.45 + 0.35 * tufts + (herbs.nearest < 0.17 && (herbs.id & 7) == 0 ? 0.35 : 0.0);
+    return 0.45 + 0.6 * tufts + (herbs.nearest < 0.17 && (herbs.id & 7) == 0 ? 0.35 : 0.0);
   }));
   const Texture* blades = add(Texture(256, 256, [=](double u, double v) {
     const double lean = 0.1 * periodic_noise(seed + 61, 6 * u, 6 * v, 6);
-    return 0.5 + 0.32 * periodic_fractal(seed + 60, 60 * (u + lean), 20 * v, 20, 3, 0.8) +
+    return 0.5 + 0.45 * periodic_fractal(seed + 60, 40 * (u + lean), 20 * v, 20, 3, 0.8) +
            0.2 * periodic_fractal(seed + 62, 24 * u, 24 * v, 24, 4, 0.8);
   }));
   const Texture* pebbles = add(Texture(512, 512, [=](double u, double v) {
@@ -166,7 +166,7 @@ void MaterialLibrary::add_ground() {
     return 0.2 + 0.9 * cracks + 0.12 * strata + 0.2 * periodic_fractal(seed + 81, 30 * u, 30 * v, 30, 4, 0.8);
   }));
   const double albedo = 1.0 / 255.0;
-  materials_[kGround].layers = {{wild, kGroundPeriod_m, kGroundPeriod_m, 0.75 * albedo},
+  materials_[kGround].layers = {{wild, kGroundPeriod_m, kGroundPeriod_m, 0.95 * albedo},
                                 modulating(meadow, 16.0),
                                 modulating(blades, 1.0)};
   materials_[kFields].layers = {
@@ -191,10 +191,10 @@ void MaterialLibrary::add_roads() {
     const double lane = std::fmod(u * lanes, 1.0);
     const double tracks =
         std::exp(-40 * (lane - 0.25) * (lane - 0.25)) + std::exp(-40 * (lane - 0.75) * (lane - 0.75));
-    const double blotch = periodic_fractal(seed, 3 * u, 6 * v, 3, 6, 0.65);
+    const double blotch = periodic_fractal(seed, 6 * u, 18 * v, 6, 6, 0.8);
     const double crack = std::abs(periodic_fractal(seed + 3, 4 * u, 8 * v, 4, 5, 0.6));
     const double patch = periodic_noise(seed + 5, 4 * u, 7 * v, 1) > 0.42 ? -0.05 : 0.0;
-    return 0.23 + 0.02 * tracks + 0.09 * blotch + patch - (crack < 0.012 ? 0.1 : 0.0);
+    return 0.25 + 0.02 * tracks + 0.14 * blotch + patch - (crack < 0.012 ? 0.12 : 0.0);
   };
   const auto road = [&](double width_m, int lanes, const std::function<void(Canvas*)>& paint) {
     constexpr double kLength_m = 24.0;

@@ -318,6 +318,7 @@ class Renderer::Impl {
     }
     const VisibleFace& visible = visible_.faces()[index];
     const Material& material = (*scene_->materials)[visible.face->material];
+    const CutoutMap cutout = cutout_map(material, index);
     for (int row = first; row < last; ++row) {
       const float left = edge_left_[static_cast<std::size_t>(row)];
       const float right = edge_right_[static_cast<std::size_t>(row)];
@@ -328,8 +329,8 @@ class Renderer::Impl {
                                static_cast<std::size_t>(row) * static_cast<std::size_t>(view_->width) +
                                static_cast<std::size_t>(begin);
       const float start = at_zero + per_y * static_cast<float>(row) + per_x * static_cast<float>(begin);
-      if (material.cutout != nullptr) {
-        fill_cutout(material, index, start, per_x, begin, end, row, cell);
+      if (cutout.texture != nullptr) {
+        fill_cutout(cutout, index, start, per_x, begin, end, row, cell);
       } else {
         kernels_.fill(start, per_x, static_cast<std::uint32_t>(index) + 1, end - begin, &inverse_depth_[cell],
                       &face_of_cell_[cell]);
@@ -349,29 +350,48 @@ class Renderer::Impl {
     }
   }
 
-  // Foliage and the like: cells where the texture has a hole show what is behind.
-  void fill_cutout(const Material& material, std::size_t index, float start, float slope, int begin, int end,
-                   int row, std::size_t cell) {
+  // Where the rows of a face with holes take their texture coordinates from, in view axes.
+  struct CutoutMap {
+    const Texture* texture = nullptr;
+    Eigen::Vector3f u_num, v_num, den;
+    float log2_density = 0;
+  };
+
+  CutoutMap cutout_map(const Material& material, std::size_t index) {
+    CutoutMap map;
+    map.texture = material.cutout;
+    if (map.texture == nullptr) return map;
     const ReadyFace& ready = ready_face(index);
-    const ShadeLayer& layer = ready.shade.layer[0];
-    const Eigen::Map<const Eigen::Vector3f> u_num(layer.u_num), v_num(layer.v_num), den(ready.shade.den);
-    const Eigen::Matrix3f& R = view_->R_view_camera;
-    const Eigen::Vector3f u_row = R * u_num, v_row = R * v_num, den_row = R * den;
+    map.u_num = view_->R_view_camera * Eigen::Map<const Eigen::Vector3f>(ready.shade.layer[0].u_num);
+    map.v_num = view_->R_view_camera * Eigen::Map<const Eigen::Vector3f>(ready.shade.layer[0].v_num);
+    map.den = view_->R_view_camera * Eigen::Map<const Eigen::Vector3f>(ready.shade.den);
+    map.log2_density = ready.info[0].log2_density;
+    return map;
+  }
+
+  // Foliage and the like: cells where the texture has a hole show what is behind.
+  void fill_cutout(const CutoutMap& map, std::size_t index, float start, float slope, int begin, int end,
+                   int row, std::size_t cell) {
     const float y = (static_cast<float>(row) - view_->centre_y) / view_->focal_y;
-    const float pixel_m = 1.0F / (std::max(start, 1e-6F) * view_->focal_x);
-    const float level_size = rough_log2(pixel_m) + ready.info[0].log2_density + dither_;
-    const int level = std::clamp(static_cast<int>(level_size), 0, material.cutout->levels() - 1);
-    const TextureLevel& texels = material.cutout->level(level);
+    const float per_x = 1.0F / view_->focal_x, x0 = (static_cast<float>(begin) - view_->centre_x) * per_x;
+    const float pixel_m = per_x / std::max(start, 1e-6F);
+    const float level_size = rough_log2(pixel_m) + map.log2_density + dither_;
+    const int level = std::clamp(static_cast<int>(level_size), 0, map.texture->levels() - 1);
+    const TextureLevel& texels = map.texture->level(level);
+    const auto width = static_cast<float>(texels.width), height = static_cast<float>(texels.height);
+    const float u0 = (map.u_num.x() * x0 + map.u_num.y() * y + map.u_num.z()) * width,
+                du = map.u_num.x() * per_x * width;
+    const float v0 = (map.v_num.x() * x0 + map.v_num.y() * y + map.v_num.z()) * height,
+                dv = map.v_num.x() * per_x * height;
+    const float d0 = map.den.x() * x0 + map.den.y() * y + map.den.z(), dd = map.den.x() * per_x;
     for (int i = 0; i < end - begin; ++i) {
-      const float inverse_depth = start + slope * static_cast<float>(i);
+      const auto step = static_cast<float>(i);
+      const float inverse_depth = start + slope * step;
       const std::size_t at = cell + static_cast<std::size_t>(i);
       if (inverse_depth <= inverse_depth_[at]) continue;
-      const float x = (static_cast<float>(begin + i) - view_->centre_x) / view_->focal_x;
-      const float inverse = 1.0F / (den_row.x() * x + den_row.y() * y + den_row.z());
-      const float u = (u_row.x() * x + u_row.y() * y + u_row.z()) * inverse;
-      const float v = (v_row.x() * x + v_row.y() * y + v_row.z()) * inverse;
-      const int tx = ceil_to_int(u * static_cast<float>(texels.width)) - 1;
-      const int ty = ceil_to_int(v * static_cast<float>(texels.height)) - 1;
+      const float inverse = 1.0F / (d0 + dd * step);
+      const int tx = ceil_to_int((u0 + du * step) * inverse) - 1,
+                ty = ceil_to_int((v0 + dv * step) * inverse) - 1;
       if (texels.at(tx, ty) < cutout_threshold_) continue;
       inverse_depth_[at] = inverse_depth;
       face_of_cell_[at] = static_cast<std::uint32_t>(index) + 1;

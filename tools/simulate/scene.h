@@ -15,7 +15,7 @@ struct Sky {
   const Texture* cloud_detail = nullptr;
   double height_m = 1500.0;  // above the world's zero
   double period_m = 6000.0, detail_period_m = 700.0;
-  double radiance = 1.7;
+  double radiance = 1.35;
   Eigen::Vector2d wind_mps = Eigen::Vector2d::Zero();
 };
 

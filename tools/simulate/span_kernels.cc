@@ -29,6 +29,7 @@ void fill(float first, float slope, std::uint32_t value, int count, float* HWY_R
     const VF mine = hn::Add(start, hn::Mul(step, hn::Iota(d, static_cast<float>(i))));
     const VF theirs = hn::LoadU(d, inverse_depth + i);
     const auto nearer = hn::Gt(mine, theirs);
+    if (hn::AllFalse(d, nearer)) continue;
     hn::StoreU(hn::IfThenElse(nearer, mine, theirs), d, inverse_depth + i);
     hn::StoreU(hn::IfThenElse(hn::RebindMask(du, nearer), values, hn::LoadU(du, id + i)), du, id + i);
   }

@@ -396,7 +396,7 @@ void build_wilderness(const Site& site, const ChunkSite& chunk) {
              0.3 + 1.4 * std::pow(one->uniform(), 3.0), one);
   });
   // Woods: a tree wherever the ground says forest.
-  strew(45.0, [&](double x, double y, double z, double distance, Random* one) {
+  strew(30.0, [&](double x, double y, double z, double distance, Random* one) {
     if (site.terrain->material(x, y, z, 0.0, distance) != kForest) return;
     add_tree(chunk.builder, {chunk.local(x, y, z - 0.5), one->uniform(0.0, kPi)}, one->uniform(8.0, 16.0),
              TreeDetail::kFar, one);

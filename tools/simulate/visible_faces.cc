@@ -62,6 +62,7 @@ void VisibleFaces::gather_cluster(const Chunk& chunk, const Cluster& cluster, co
 void VisibleFaces::gather(const Scene& scene, const ViewBounds& bounds,
                           const Eigen::Vector3d& camera_position, double time_s) {
   faces_.clear();
+  clusters_.clear();
   reference_ = camera_position;
   for (const Chunk* chunk : scene.chunks) {
     const Eigen::Vector3f offset = (chunk->origin - camera_position).cast<float>();
@@ -69,8 +70,17 @@ void VisibleFaces::gather(const Scene& scene, const ViewBounds& bounds,
       const Eigen::Vector3f centre = cluster.centre + offset;
       const float distance = centre.norm();
       if (cluster.radius_m * bounds.focal_px < kMinClusterRadius_px * distance) continue;
-      if (!outside(bounds, centre, cluster.radius_m)) gather_cluster(*chunk, cluster, offset);
+      if (outside(bounds, centre, cluster.radius_m)) continue;
+      clusters_.push_back(
+          {distance - cluster.radius_m, static_cast<std::uint32_t>(clusters_.size()), chunk, &cluster});
     }
+  }
+  // The nearest first: what they hide is then turned down with one comparison a cell.
+  std::sort(clusters_.begin(), clusters_.end(), [](const VisibleCluster& a, const VisibleCluster& b) {
+    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.order < b.order;
+  });
+  for (const VisibleCluster& c : clusters_) {
+    gather_cluster(*c.chunk, *c.cluster, (c.chunk->origin - camera_position).cast<float>());
   }
   first_moving_ = faces_.size();
   objects_.clear();

@@ -43,7 +43,15 @@ class VisibleFaces {
   [[nodiscard]] const Eigen::Vector3d& reference() const { return reference_; }
 
  private:
+  struct VisibleCluster {
+    float distance_m;
+    std::uint32_t order;  // as gathered: clusters at the same distance keep it
+    const Chunk* chunk;
+    const Cluster* cluster;
+  };
   void gather_cluster(const Chunk& chunk, const Cluster& cluster, const Eigen::Vector3f& offset);
+
+  std::vector<VisibleCluster> clusters_;
 
   std::vector<VisibleFace> faces_;
   std::size_t first_moving_ = 0;
