@@ -17,17 +17,6 @@ float clamped(double value) {
   return static_cast<float>(std::clamp(value, 0.01, 1.0));
 }
 
-// Multiplies a canvas by tileable dirt: streaks and blotches of a few decimetres to metres.
-void weather(Canvas* canvas, std::uint64_t seed, double strength, int period) {
-  canvas->each([=](double x, double y, float value) {
-    const double u = x / canvas->width_m(), v = y / canvas->height_m();
-    const double blotch = periodic_fractal(seed, u * period, v * period, period, 4, 0.6);
-    // Rain runs down: stretched upwards.
-    const double streak = periodic_noise(seed + 9, u * 8 * period, v * period, 8 * period);
-    return clamped(value * (1.0 + strength * (blotch + 0.35 * streak)));
-  });
-}
-
 void lay_bricks(Canvas* canvas, std::uint64_t seed, double brick_m, double course_m, double joint_m,
                 float brick, float joint) {
   const int courses = static_cast<int>(std::lround(canvas->height_m() / course_m));
@@ -89,7 +78,10 @@ void draw_window(Canvas* canvas, Random* random, double x, double floor_m, const
 }  // namespace
 
 MaterialLibrary::MaterialLibrary(std::uint64_t seed)
-    : seed_(seed_of(seed, "materials")), materials_(kMaterialCount) {
+    : seed_(seed_of(seed, "materials")),
+      materials_(kMaterialCount),
+      soft_(seed_of(seed_, "soft"), 4, 4, 0.6),
+      rough_(seed_of(seed_, "rough"), 6, 6, 0.8) {
   const std::uint64_t grain_seed = seed_of(seed_, "grain");
   grain_ = add(Texture(256, 256, [=](double u, double v) {
     return 0.5 + 0.42 * periodic_fractal(grain_seed, 5 * u, 5 * v, 5, 6, 0.85);
@@ -103,6 +95,17 @@ MaterialLibrary::MaterialLibrary(std::uint64_t seed)
 }
 
 MaterialLibrary::~MaterialLibrary() = default;
+
+// Multiplies a canvas by tileable dirt: streaks and blotches of a few decimetres to metres.
+void MaterialLibrary::weather(Canvas* canvas, std::uint64_t seed, double strength) const {
+  Random random(seed);
+  const double du = random.uniform(), dv = random.uniform();
+  canvas->each([&](double x, double y, float value) {
+    const double u = x / canvas->width_m() + du, v = y / canvas->height_m() + dv;
+    // Rain runs straight down.
+    return clamped(value * (1.0 + strength * (soft_.at(u, v) + 0.35 * rough_.at(2.0 * u, dv))));
+  });
+}
 
 const Texture* MaterialLibrary::add(Texture texture) {
   textures_.push_back(std::make_unique<Texture>(std::move(texture)));
@@ -119,19 +122,19 @@ void MaterialLibrary::add_ground() {
     return Layer{texture, period_m, period_m, 1.0 / texture->mean()};
   };
   // Kilometres: what one sees on far slopes.
-  const Texture* wild = add(Texture(1024, 1024, [=](double u, double v) {
-    const double patches = periodic_fractal(seed, 10 * u, 10 * v, 10, 7, 0.62);
-    const double groves = periodic_fractal(seed + 20, 24 * u, 24 * v, 24, 5, 0.6);
+  const Texture* wild = add(Texture(1024, 1024, [=, this](double u, double v) {
+    const double patches = 0.8 * soft_.at(2 * u, 2 * v) + 0.35 * rough_.at(8 * u, 8 * v);
+    const double groves = soft_.at(6 * u + 0.3, 6 * v);
     return 0.30 + 0.22 * patches - (groves > 0.12 ? 0.13 : 0.0);
   }));
-  const Texture* fields = add(Texture(1024, 1024, [=](double u, double v) {
+  const Texture* fields = add(Texture(1024, 1024, [=, this](double u, double v) {
     // Plots: the strips of bent cells, each with a tone and furrows' direction of its own; dark hedges
     // between.
     const double bend = 0.4 * periodic_noise(seed + 31, 5 * u, 5 * v, 5);
     const Cells plot = periodic_cells(seed + 30, 14 * u + bend, 14 * v - bend, 14);
     const double tone = static_cast<double>(plot.id >> 40) / 16777216.0;
     const bool hedge = plot.second - plot.nearest < 0.05;
-    const double mottle = periodic_fractal(seed + 32, 40 * u, 40 * v, 40, 5, 0.7);
+    const double mottle = rough_.at(7 * u, 7 * v);
     return (hedge ? 0.08 : 0.16 + 0.34 * tone) * (1.0 + 0.25 * mottle);
   }));
   const Texture* canopy = add(Texture(512, 512, [=](double u, double v) {
@@ -162,7 +165,7 @@ void MaterialLibrary::add_ground() {
   }));
   const Texture* crags = add(Texture(512, 512, [=](double u, double v) {
     const double cracks = std::abs(periodic_fractal(seed + 80, 6 * u, 9 * v, 3, 6, 0.7));
-    const double strata = periodic_noise(seed + 82, 3 * u, 40 * v, 1);
+    const double strata = periodic_noise(seed + 82, 4 * u, 40 * v, 4);
     return 0.2 + 0.9 * cracks + 0.12 * strata + 0.2 * periodic_fractal(seed + 81, 30 * u, 30 * v, 30, 4, 0.8);
   }));
   const double albedo = 1.0 / 255.0;
@@ -186,14 +189,14 @@ void MaterialLibrary::add_roads() {
   const std::uint64_t seed = seed_of(seed_, "roads");
   const double albedo = 1.0 / 255.0;
   // Asphalt under whatever is painted on it: wheel tracks, patches, cracks, repaired seams.
-  const auto asphalt = [seed](double x, double y, double width_m, double length_m, int lanes) {
+  const auto asphalt = [this, seed](double x, double y, double width_m, double length_m, int lanes) {
     const double u = x / width_m, v = y / length_m;
     const double lane = std::fmod(u * lanes, 1.0);
     const double tracks =
         std::exp(-40 * (lane - 0.25) * (lane - 0.25)) + std::exp(-40 * (lane - 0.75) * (lane - 0.75));
-    const double blotch = periodic_fractal(seed, 6 * u, 18 * v, 6, 6, 0.8);
-    const double crack = std::abs(periodic_fractal(seed + 3, 4 * u, 8 * v, 4, 5, 0.6));
-    const double patch = periodic_noise(seed + 5, 4 * u, 7 * v, 1) > 0.42 ? -0.05 : 0.0;
+    const double blotch = rough_.at(u, 3 * v);
+    const double crack = std::abs(soft_.at(u, 2 * v));
+    const double patch = periodic_noise(seed + 5, 4 * u, 8 * v, 4) > 0.42 ? -0.05 : 0.0;
     return 0.25 + 0.02 * tracks + 0.14 * blotch + patch - (crack < 0.012 ? 0.12 : 0.0);
   };
   const auto road = [&](double width_m, int lanes, const std::function<void(Canvas*)>& paint) {
@@ -212,7 +215,7 @@ void MaterialLibrary::add_roads() {
     paint(&canvas);
     // Worn paint shows the asphalt's grain.
     canvas.each([&](double x, double y, float value) {
-      const double wear = periodic_fractal(seed + 8, 20 * x / width_m, 40 * y / kLength_m, 20, 4, 0.8);
+      const double wear = rough_.at(3 * x / width_m, 6 * y / kLength_m);
       return clamped(value * (1.0 + (value > 0.5F ? 0.5 : 0.2) * wear));
     });
     return add(canvas.texture());
@@ -251,11 +254,11 @@ void MaterialLibrary::add_roads() {
 
   Canvas slabs(512, 512, 4.8, 4.8, 0.0F);
   lay_bricks(&slabs, seed + 30, 0.6, 0.4, 0.014, 0.42F, 0.16F);
-  weather(&slabs, seed + 31, 0.25, 4);
+  weather(&slabs, seed + 31, 0.25);
   materials_[kPavement].layers = {{add(slabs.texture()), 4.8, 4.8, albedo}, detail(0.7)};
   Canvas kerb(256, 32, 4.0, 0.5, 0.5F);
   for (int i = 0; i < 4; ++i) kerb.rectangle(i, 0, i + 0.02, 0.5, 0.1F);
-  weather(&kerb, seed + 32, 0.35, 4);
+  weather(&kerb, seed + 32, 0.35);
   materials_[kKerb].layers = {{add(kerb.texture()), 4.0, 0.5, albedo}};
 }
 
@@ -271,7 +274,7 @@ void MaterialLibrary::add_facades() {
     } else {
       wall.rectangle(0, 0, 12, 9.6, tone);
     }
-    weather(&wall, seed + 1, 0.16, 5);
+    weather(&wall, seed + 1, 0.16);
     if (i % 3 == 1) wall.rectangle(0, 0, 12, 0.28, clamped(tone * 1.35));  // a string course a storey group
     WindowStyle style{random.uniform(0.9, 1.5),
                       random.uniform(1.3, 1.8),
@@ -332,7 +335,7 @@ void MaterialLibrary::add_facades() {
       wall.rectangle(x, y, x + 0.22, y + 0.07, ink);
       if (random.chance(0.5)) wall.rectangle(x + 0.15, 2.92, x + 0.22, 3.28, ink);
     }
-    weather(&wall, seed + 1, 0.12, 5);
+    weather(&wall, seed + 1, 0.12);
     materials_[static_cast<std::size_t>(kFirstShop + i)].layers = {{add(wall.texture()), 12.0, 3.6, albedo},
                                                                    detail(1.1)};
   }
@@ -343,10 +346,10 @@ void MaterialLibrary::add_walls() {
   const double albedo = 1.0 / 255.0;
   Canvas brick(512, 512, 4.0, 4.0, 0.0F);
   lay_bricks(&brick, seed, 0.25, 0.08, 0.013, 0.26F, 0.45F);
-  weather(&brick, seed + 1, 0.4, 4);
+  weather(&brick, seed + 1, 0.4);
   materials_[kBrickWall].layers = {{add(brick.texture()), 4.0, 4.0, albedo}, detail(0.8)};
   Canvas concrete(512, 512, 8.0, 8.0, 0.45F);
-  weather(&concrete, seed + 2, 0.4, 4);
+  weather(&concrete, seed + 2, 0.4);
   for (int i = 0; i < 4; ++i) {  // formwork joints and anchor holes
     concrete.rectangle(0, 2 * i, 8, 2 * i + 0.03, 0.2F);
     concrete.rectangle(2 * i, 0, 2 * i + 0.03, 8, 0.2F);
@@ -355,10 +358,10 @@ void MaterialLibrary::add_walls() {
   materials_[kConcrete].layers = {{add(concrete.texture()), 8.0, 8.0, albedo}, detail(1.0)};
   Canvas tiles(256, 256, 3.2, 3.2, 0.0F);
   lay_bricks(&tiles, seed + 3, 0.2, 0.32, 0.03, 0.2F, 0.07F);
-  weather(&tiles, seed + 4, 0.4, 3);
+  weather(&tiles, seed + 4, 0.4);
   materials_[kRoofTiles].layers = {{add(tiles.texture()), 3.2, 3.2, albedo}, detail(5.0)};
   Canvas flat(256, 256, 16.0, 16.0, 0.28F);
-  weather(&flat, seed + 5, 0.6, 4);
+  weather(&flat, seed + 5, 0.6);
   for (int i = 0; i < 4; ++i) flat.rectangle(0, 4 * i, 16, 4 * i + 0.12, 0.14F);
   Random random(seed + 6);
   for (int i = 0; i < 7; ++i) {  // skylights, vents
@@ -491,7 +494,7 @@ void MaterialLibrary::add_objects() {
   }
   container.rectangle(1.0, 1.6, 2.6, 2.1, 0.75F);
   for (int i = 0; i < 9; ++i) container.rectangle(3.6 + 0.24 * i, 1.9, 3.74 + 0.24 * i, 2.2, 0.8F);
-  weather(&container, seed + 4, 0.35, 3);
+  weather(&container, seed + 4, 0.35);
   materials_[kContainer].layers = {{add(container.texture()), 6.0, 2.6, albedo}, detail(0.8)};
 }
 

@@ -5,7 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "tools/simulate/canvas.h"
 #include "tools/simulate/mesh.h"
+#include "tools/simulate/noise.h"
 
 namespace farpoint::tools::simulate {
 
@@ -62,6 +64,7 @@ class MaterialLibrary {
 
  private:
   const Texture* add(Texture texture);
+  void weather(Canvas* canvas, std::uint64_t seed, double strength) const;
   void add_ground();
   void add_roads();
   void add_facades();
@@ -73,6 +76,7 @@ class MaterialLibrary {
   std::uint64_t seed_;
   std::vector<std::unique_ptr<Texture>> textures_;
   std::vector<Material> materials_;
+  NoiseSheet soft_, rough_;
   const Texture* grain_ = nullptr;  // fine structure that every rough surface has
 };
 

@@ -91,6 +91,28 @@ double periodic_fractal(std::uint64_t seed, double x, double y, int period, int 
   return sum / total;
 }
 
+NoiseSheet::NoiseSheet(std::uint64_t seed, int period, int octaves, double gain) {
+  const double scale = static_cast<double>(period) / kSide;
+  values_.reserve(kSide * kSide);
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x)
+      values_.push_back(
+          static_cast<float>(periodic_fractal(seed, x * scale, y * scale, period, octaves, gain)));
+  }
+}
+
+double NoiseSheet::at(double u, double v) const {
+  const double x = (u - std::floor(u)) * kSide, y = (v - std::floor(v)) * kSide;
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const double a = x - ix, b = y - iy;
+  const auto value = [this](int column, int row) {
+    return static_cast<double>(
+        values_[static_cast<std::size_t>((row & (kSide - 1)) * kSide + (column & (kSide - 1)))]);
+  };
+  return (1 - b) * ((1 - a) * value(ix, iy) + a * value(ix + 1, iy)) +
+         b * ((1 - a) * value(ix, iy + 1) + a * value(ix + 1, iy + 1));
+}
+
 Cells periodic_cells(std::uint64_t seed, double x, double y, int period) {
   const auto cx = static_cast<std::int64_t>(std::floor(x)), cy = static_cast<std::int64_t>(std::floor(y));
   Cells cells{1e9, 1e9, 0};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace farpoint::tools::simulate {
 
@@ -16,6 +17,18 @@ namespace farpoint::tools::simulate {
 [[nodiscard]] double periodic_noise(std::uint64_t seed, double x, double y, int period);
 [[nodiscard]] double periodic_fractal(std::uint64_t seed, double x, double y, int period, int octaves,
                                       double gain = 0.5);
+
+// A sheet of periodic fractal noise, made once and looked up many times: dirt is dirt wherever it sticks.
+class NoiseSheet {
+ public:
+  NoiseSheet(std::uint64_t seed, int period, int octaves, double gain);
+  // Repeats every unit; interpolated.
+  [[nodiscard]] double at(double u, double v) const;
+
+ private:
+  static constexpr int kSide = 512;
+  std::vector<float> values_;
+};
 
 // Nearest of points strewn one a cell, periodic: distances to the nearest and the second nearest, and a
 // number that tells the nearest from the others. Pebbles, stones, tree crowns from above.

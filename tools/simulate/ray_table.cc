@@ -11,7 +11,7 @@ namespace {
 // a cube.
 constexpr double kMaxSingleView_rad = 62.0 * std::numbers::pi / 180.0;
 // Under distortion cells and pixels do not coincide: finer cells keep the outlines sharp.
-constexpr double kDistortedDensity = 1.4;
+constexpr double kDistortedDensity = 1.15;
 
 bool is_plain_pinhole(const slam::Camera::Parameters& p) {
   return p.model == slam::CameraModel::kPinholeRadtan &&

@@ -379,23 +379,22 @@ class Renderer::Impl {
     const int level = std::clamp(static_cast<int>(level_size), 0, map.texture->levels() - 1);
     const TextureLevel& texels = map.texture->level(level);
     const auto width = static_cast<float>(texels.width), height = static_cast<float>(texels.height);
-    const float u0 = (map.u_num.x() * x0 + map.u_num.y() * y + map.u_num.z()) * width,
-                du = map.u_num.x() * per_x * width;
-    const float v0 = (map.v_num.x() * x0 + map.v_num.y() * y + map.v_num.z()) * height,
-                dv = map.v_num.x() * per_x * height;
-    const float d0 = map.den.x() * x0 + map.den.y() * y + map.den.z(), dd = map.den.x() * per_x;
-    for (int i = 0; i < end - begin; ++i) {
-      const auto step = static_cast<float>(i);
-      const float inverse_depth = start + slope * step;
-      const std::size_t at = cell + static_cast<std::size_t>(i);
-      if (inverse_depth <= inverse_depth_[at]) continue;
-      const float inverse = 1.0F / (d0 + dd * step);
-      const int tx = ceil_to_int((u0 + du * step) * inverse) - 1,
-                ty = ceil_to_int((v0 + dv * step) * inverse) - 1;
-      if (texels.at(tx, ty) < cutout_threshold_) continue;
-      inverse_depth_[at] = inverse_depth;
-      face_of_cell_[at] = static_cast<std::uint32_t>(index) + 1;
-    }
+    CutoutRow cutout{};
+    cutout.inverse_depth = start;
+    cutout.d_inverse_depth = slope;
+    cutout.u = (map.u_num.x() * x0 + map.u_num.y() * y + map.u_num.z()) * width;
+    cutout.du = map.u_num.x() * per_x * width;
+    cutout.v = (map.v_num.x() * x0 + map.v_num.y() * y + map.v_num.z()) * height;
+    cutout.dv = map.v_num.x() * per_x * height;
+    cutout.den = map.den.x() * x0 + map.den.y() * y + map.den.z();
+    cutout.d_den = map.den.x() * per_x;
+    cutout.texels = texels.texels.data();
+    cutout.mask_x = texels.width - 1;
+    cutout.mask_y = texels.height - 1;
+    cutout.stride = texels.stride;
+    cutout.threshold = cutout_threshold_;
+    kernels_.fill_cutout(cutout, static_cast<std::uint32_t>(index) + 1, end - begin, &inverse_depth_[cell],
+                         &face_of_cell_[cell]);
   }
 
   // ---- shading: what light comes along each ray ----

@@ -42,6 +42,35 @@ void fill(float first, float slope, std::uint32_t value, int count, float* HWY_R
   }
 }
 
+void fill_cutout(const CutoutRow& row, std::uint32_t value, int count, float* HWY_RESTRICT inverse_depth,
+                 std::uint32_t* HWY_RESTRICT id) {
+  const F d;
+  const U du;
+  const I di;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  const auto along = [d](float start, float step, VF i)
+                         HWY_ATTR { return hn::Add(hn::Set(d, start), hn::Mul(hn::Set(d, step), i)); };
+  // Depths and ids have room for a whole vector behind their end; what lies there is put back.
+  for (int at = 0; at < count; at += lanes) {
+    const VF i = hn::Iota(d, static_cast<float>(at));
+    const VF mine = along(row.inverse_depth, row.d_inverse_depth, i);
+    const VF theirs = hn::LoadU(d, inverse_depth + at);
+    auto drawn = hn::And(hn::Gt(mine, theirs), hn::FirstN(d, static_cast<std::size_t>(count - at)));
+    if (hn::AllFalse(d, drawn)) continue;
+    const VF inverse = hn::Div(hn::Set(d, 1.0F), along(row.den, row.d_den, i));
+    const auto x = hn::ConvertTo(di, hn::Floor(hn::Mul(along(row.u, row.du, i), inverse)));
+    const auto y = hn::ConvertTo(di, hn::Floor(hn::Mul(along(row.v, row.dv, i), inverse)));
+    const auto offset = hn::Add(hn::Mul(hn::And(y, hn::Set(di, row.mask_y)), hn::Set(di, row.stride)),
+                                hn::And(x, hn::Set(di, row.mask_x)));
+    const auto texels = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(row.texels), offset);
+    const auto solid = hn::Gt(hn::And(texels, hn::Set(di, 255)), hn::Set(di, row.threshold - 1));
+    drawn = hn::And(drawn, hn::RebindMask(d, solid));
+    hn::StoreU(hn::IfThenElse(drawn, mine, theirs), d, inverse_depth + at);
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(du, drawn), hn::Set(du, value), hn::LoadU(du, id + at)), du,
+               id + at);
+  }
+}
+
 HWY_INLINE VF dot(F d, const float a[3], VF x, VF y, VF z) {
   return hn::Add(hn::Add(hn::Mul(hn::Set(d, a[0]), x), hn::Mul(hn::Set(d, a[1]), y)),
                  hn::Mul(hn::Set(d, a[2]), z));
@@ -104,7 +133,7 @@ void shade(const ShadeFace& face, const RaySpan& rays, int count, float weight, 
 }
 
 const SpanKernels* table() {
-  static constexpr SpanKernels kTable = {fill, shade};
+  static constexpr SpanKernels kTable = {fill, fill_cutout, shade};
   return &kTable;
 }
 

@@ -37,10 +37,23 @@ struct RaySpan {
   const float* z;
 };
 
+// Texture coordinates along a row of a face with holes: at cell i, u = (u + i du) / (den + i d_den), in
+// texels.
+struct CutoutRow {
+  float inverse_depth, d_inverse_depth;
+  float u, du, v, dv, den, d_den;
+  const std::uint8_t* texels = nullptr;
+  std::int32_t mask_x = 0, mask_y = 0, stride = 0;
+  std::int32_t threshold = 128;  // texels below are holes
+};
+
 struct SpanKernels {
   // inverse_depth[i] and id[i] become `first + i * slope` and `value` where that is nearer (larger).
   void (*fill)(float first, float slope, std::uint32_t value, int count, float* inverse_depth,
                std::uint32_t* id);
+  // The same where the texture has no hole.
+  void (*fill_cutout)(const CutoutRow& row, std::uint32_t value, int count, float* inverse_depth,
+                      std::uint32_t* id);
   // radiance[i] += weight * what is seen along ray i.
   void (*shade)(const ShadeFace& face, const RaySpan& rays, int count, float weight, float* radiance);
 };
