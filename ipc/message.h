@@ -22,6 +22,7 @@
 #include "farpoint/odometry_t.hpp"
 #include "farpoint/pose_t.hpp"
 #include "farpoint/schedule_t.hpp"
+#include "farpoint/simulation_t.hpp"
 #include "farpoint/status_t.hpp"
 #include "farpoint/summary_t.hpp"
 #include "farpoint/timing_t.hpp"
@@ -55,6 +56,8 @@ template <>
 inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
 template <>
 inline constexpr std::string_view kLayout<schedule_t> = "40 16 8";
+template <>
+inline constexpr std::string_view kLayout<simulation_t> = "8 4 sss 8 8 4 4 1";
 template <>
 inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 40 64 24 16 8 24 8 ssss";
 template <>

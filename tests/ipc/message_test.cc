@@ -200,7 +200,7 @@ template <typename Message>
 class EveryMessage : public testing::Test {};
 
 using AllMessages = testing::Types<calibration_t, ground_truth_t, image_t, imu_t, map_from_odom_t, map_t,
-                                   odometry_t, pose_t, status_t, summary_t, timing_t, trajectory_t, wheels_t>;
+                                   odometry_t, pose_t, simulation_t, status_t, summary_t, timing_t, trajectory_t, wheels_t>;
 TYPED_TEST_SUITE(EveryMessage, AllMessages);
 
 template <typename Message>

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "slam/geometry/camera.h"
 #include "slam/geometry/se3.h"
@@ -19,5 +20,7 @@ struct CameraFile {
 
 // Throws InputError naming file, line, key and what was expected.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
+// The same for a file's content that is at hand; `file` is for complaints.
+[[nodiscard]] CameraFile parse_camera_file(const std::string& content, const std::filesystem::path& file);
 
 }  // namespace farpoint::tools
