@@ -104,16 +104,19 @@ Path::Place Path::at(double s_m) const {
   const auto index = [&](std::ptrdiff_t k) {
     return static_cast<std::size_t>(closed_ ? (k % n + n) % n : std::clamp<std::ptrdiff_t>(k, 0, n - 1));
   };
-  const Eigen::Vector2d &p0 = points_[index(i - 1)], &p1 = points_[index(i)], &p2 = points_[index(i + 1)],
-                        &p3 = points_[index(i + 2)];
-  // Catmull-Rom: passes through the points, with a continuous direction.
-  const Eigen::Vector2d m1 = 0.5 * (p2 - p0), m2 = 0.5 * (p3 - p1);
-  const double t = share, t2 = t * t, t3 = t2 * t;
+  // Beyond an end the points go straight on.
+  const auto point = [&](std::ptrdiff_t k) -> Eigen::Vector2d {
+    if (closed_ || (k >= 0 && k < n)) return points_[index(k)];
+    const Eigen::Vector2d &end = points_[index(k)], &inner = points_[index(k < 0 ? 1 : n - 2)];
+    return end + static_cast<double>(k < 0 ? -k : k - (n - 1)) * (end - inner);
+  };
+  const Eigen::Vector2d p0 = point(i - 1), p1 = point(i), p2 = point(i + 1), p3 = point(i + 2);
+  // A cubic B-spline: its curvature is continuous, so that a lane beside it is driven without jerks. (It
+  // passes the points by a sixth of their second difference: millimetres.)
+  const double t = share, t2 = t * t, t3 = t2 * t, r = 1.0 - t;
   place.position =
-      (2 * t3 - 3 * t2 + 1) * p1 + (t3 - 2 * t2 + t) * m1 + (3 * t2 - 2 * t3) * p2 + (t3 - t2) * m2;
-  place.forward =
-      ((6 * t2 - 6 * t) * p1 + (3 * t2 - 4 * t + 1) * m1 + (6 * t - 6 * t2) * p2 + (3 * t2 - 2 * t) * m2)
-          .normalized();
+      (r * r * r * p0 + (3 * t3 - 6 * t2 + 4) * p1 + (-3 * t3 + 3 * t2 + 3 * t + 1) * p2 + t3 * p3) / 6.0;
+  place.forward = (-r * r * p0 + (3 * t2 - 4 * t) * p1 + (-3 * t2 + 2 * t + 1) * p2 + t2 * p3).normalized();
   place.curvature = (1 - t) * curvature_[index(i)] + t * curvature_[index(i + 1)];
   return place;
 }

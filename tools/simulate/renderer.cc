@@ -7,7 +7,9 @@
 #include <limits>
 #include <numbers>
 
+#include "tools/simulate/occlusion.h"
 #include "tools/simulate/ray_table.h"
+#include "tools/simulate/ready_face.h"
 #include "tools/simulate/span_kernels.h"
 #include "tools/simulate/visible_faces.h"
 
@@ -39,32 +41,6 @@ int ceil_to_int(float x) {
   const int i = static_cast<int>(x);
   return i + (static_cast<float>(i) < x ? 1 : 0);
 }
-
-struct LayerInfo {
-  const Texture* texture = nullptr;
-  float inverse_period_s = 1, inverse_period_t = 1, gain = 1;
-  float log2_density = 0;  // texels a metre
-};
-
-LayerInfo layer_info(const Texture& texture, double period_s_m, double period_t_m, double gain) {
-  LayerInfo info;
-  info.texture = &texture;
-  info.inverse_period_s = static_cast<float>(1.0 / period_s_m);
-  info.inverse_period_t = static_cast<float>(1.0 / period_t_m);
-  info.gain = static_cast<float>(gain);
-  info.log2_density =
-      std::log2(static_cast<float>(std::max(texture.width() / period_s_m, texture.height() / period_t_m)));
-  return info;
-}
-
-// A face ready to be shaded from one pose.
-struct ReadyFace {
-  ShadeFace shade;
-  std::array<LayerInfo, ShadeFace::kMaxLayers> info;
-  int layers = 0;
-  float brightness = 1;
-  std::uint32_t stamp = 0;
-};
 
 // Pose of the camera in one pass and band, relative to the frame's reference position.
 struct PassPose {
@@ -208,7 +184,17 @@ class Renderer::Impl {
       if (first_row_ >= last_row_) continue;
       clear_rows();
       R_view_world_ = view_->R_view_camera * pose_.R_camera_world;
-      for (std::size_t i = 0; i < visible_.faces().size(); ++i) draw_face(i);
+      draw_faces();
+    }
+  }
+
+  void draw_faces() {
+    // What moves first: it may hide what stands.
+    for (std::size_t i = visible_.first_moving(); i < visible_.faces().size(); ++i) draw_face(i);
+    for (const VisibleGroup& group : visible_.groups()) {
+      const Eigen::Vector3f centre = R_view_world_ * (group.centre - pose_.position);
+      if (is_hidden(centre, group.radius_m, *view_, first_row_, last_row_, inverse_depth_.data())) continue;
+      for (std::size_t i = group.first; i < group.last; ++i) draw_face(i);
     }
   }
 
@@ -433,29 +419,6 @@ class Renderer::Impl {
   void set_air(float haze_per_m, ShadeFace* shade) const {
     shade->haze_per_m = haze_per_m;
     shade->haze_radiance = static_cast<float>(scene_->haze_radiance);
-  }
-
-  // Texture coordinate s = axis . (camera + distance * ray) + origin, where `at_camera` is its value at the
-  // camera's place. Layers stand coarse to fine: the fine ones are the first to vanish with distance.
-  static void add_layer(const LayerInfo& info, const Eigen::Vector3f& s_axis, float s_at_camera,
-                        const Eigen::Vector3f& t_axis, float t_at_camera, ReadyFace* ready) {
-    ShadeFace& shade = ready->shade;
-    const Eigen::Map<const Eigen::Vector3f> den(shade.den);
-    int at = ready->layers++;
-    while (at > 0 && ready->info[static_cast<std::size_t>(at) - 1].log2_density > info.log2_density) {
-      ready->info[static_cast<std::size_t>(at)] = ready->info[static_cast<std::size_t>(at) - 1];
-      shade.layer[at] = shade.layer[at - 1];
-      --at;
-    }
-    ready->info[static_cast<std::size_t>(at)] = info;
-    ShadeLayer& layer = shade.layer[at];
-    layer.gain = info.gain;
-    // Whole repetitions are taken off: small numbers keep more digits.
-    float u = s_at_camera * info.inverse_period_s, v = t_at_camera * info.inverse_period_t;
-    u -= std::floor(u);
-    v -= std::floor(v);
-    Eigen::Map<Eigen::Vector3f>(layer.u_num) = shade.plane_m * info.inverse_period_s * s_axis + u * den;
-    Eigen::Map<Eigen::Vector3f>(layer.v_num) = shade.plane_m * info.inverse_period_t * t_axis + v * den;
   }
 
   // The sky is a plane above: clouds in it, haze towards the horizon.

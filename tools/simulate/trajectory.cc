@@ -19,12 +19,18 @@ Eigen::Quaterniond rotation_of(double yaw, double pitch, double roll) {
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
+// Metres driven in the lane a metre of the route: more than one on the outside of a bend.
+double lane_stretch(const DriveDescription& drive, const Path::Place& place) {
+  return std::max(1.0 - drive.lane_offset_m * place.curvature, 0.2);
+}
+
 // Highest speed at each metre of the route from which every bend ahead can be taken, braking as allowed.
 std::vector<double> speed_limits(const DriveDescription& drive, const Path& route) {
   const auto n = static_cast<std::ptrdiff_t>(route.length_m());
   std::vector<double> limit(static_cast<std::size_t>(n));
   for (std::ptrdiff_t i = 0; i < n; ++i) {
-    const double curvature = std::abs(route.at(static_cast<double>(i)).curvature);
+    const Path::Place place = route.at(static_cast<double>(i));
+    const double curvature = std::abs(place.curvature) / lane_stretch(drive, place);
     limit[static_cast<std::size_t>(i)] =
         std::min(drive.speed_mps, std::sqrt(drive.lateral_acceleration_mps2 / std::max(curvature, 1e-6)));
   }
@@ -48,7 +54,10 @@ BodyPath BodyPath::drive(const DriveDescription& drive, const Path& route, const
   const std::vector<double> limits = speed_limits(drive, route);
   const auto limit_at = [&](double s) {
     const double rest = std::fmod(s, static_cast<double>(limits.size()));
-    return limits[static_cast<std::size_t>(std::clamp(rest, 0.0, static_cast<double>(limits.size()) - 1.0))];
+    const double u = std::clamp(rest, 0.0, static_cast<double>(limits.size()) - 1.0);
+    const auto i = static_cast<std::size_t>(u);
+    const double share = u - static_cast<double>(i);
+    return (1.0 - share) * limits[i] + share * limits[(i + 1) % limits.size()];
   };
   const std::uint64_t noise = seed_of(seed, "drive");
   BodyPath path;
@@ -83,7 +92,7 @@ BodyPath BodyPath::drive(const DriveDescription& drive, const Path& route, const
     path.knots_.push_back(knot);
     path.route_.push_back(s);
     v = std::max(0.0, v + a * kKnot_s);
-    s += v * kKnot_s;
+    s += v * kKnot_s / lane_stretch(drive, place);
   }
   return path;
 }

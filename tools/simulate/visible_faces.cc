@@ -51,17 +51,21 @@ ViewBounds make_view_bounds(const RayTable& rays, const slam::SE3& T_world_camer
 }
 
 void VisibleFaces::gather_cluster(const Chunk& chunk, const Cluster& cluster, const Eigen::Vector3f& offset) {
+  const std::size_t first = faces_.size();
   for (std::uint32_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
     const Face& face = chunk.mesh.faces[i];
     const float in_front = -face.normal.dot(face.corners[0] + offset);
     if (!face.two_sided && in_front < -kBackFaceMargin_m) continue;
     faces_.push_back({&face, offset, cluster.sway_m, cluster.sway_phase, &chunk});
   }
+  if (faces_.size() > first)
+    groups_.push_back({first, faces_.size(), cluster.centre + offset, cluster.radius_m});
 }
 
 void VisibleFaces::gather(const Scene& scene, const ViewBounds& bounds,
                           const Eigen::Vector3d& camera_position, double time_s) {
   faces_.clear();
+  groups_.clear();
   clusters_.clear();
   reference_ = camera_position;
   for (const Chunk* chunk : scene.chunks) {

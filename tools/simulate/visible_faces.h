@@ -29,6 +29,13 @@ struct VisibleFace {
   const Chunk* chunk = nullptr;  // nothing for moving objects
 };
 
+// Consecutive faces that lie within a sphere.
+struct VisibleGroup {
+  std::size_t first = 0, last = 0;  // faces, last not included
+  Eigen::Vector3f centre;           // from the camera's reference position, world axes
+  float radius_m = 0;
+};
+
 class VisibleFaces {
  public:
   // Static faces around the camera's place, and moving objects as they stand at `time_s`.
@@ -38,6 +45,8 @@ class VisibleFaces {
   void move_objects(const Scene& scene, double time_s);
 
   [[nodiscard]] const std::vector<VisibleFace>& faces() const { return faces_; }
+  // The faces that do not move, nearest group first.
+  [[nodiscard]] const std::vector<VisibleGroup>& groups() const { return groups_; }
   // From here on they belong to moving objects.
   [[nodiscard]] std::size_t first_moving() const { return first_moving_; }
   [[nodiscard]] const Eigen::Vector3d& reference() const { return reference_; }
@@ -54,6 +63,7 @@ class VisibleFaces {
   std::vector<VisibleCluster> clusters_;
 
   std::vector<VisibleFace> faces_;
+  std::vector<VisibleGroup> groups_;
   std::size_t first_moving_ = 0;
   Eigen::Vector3d reference_ = Eigen::Vector3d::Zero();
   std::vector<MovingObject> objects_;
