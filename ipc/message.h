@@ -17,6 +17,7 @@
 #include "farpoint/ground_truth_t.hpp"
 #include "farpoint/image_t.hpp"
 #include "farpoint/imu_t.hpp"
+#include "farpoint/landmarks_t.hpp"
 #include "farpoint/map_from_odom_t.hpp"
 #include "farpoint/map_t.hpp"
 #include "farpoint/odometry_t.hpp"
@@ -46,6 +47,9 @@ template <>
 inline constexpr std::string_view kLayout<image_t> = "16 12 12 4 #[0:1]";
 template <>
 inline constexpr std::string_view kLayout<imu_t> = "8 24 24 8";
+template <>
+inline constexpr std::string_view kLayout<landmarks_t> =
+    "8 1 #[0: 4 1 8 4 8 24 24 8 4 8 4 4 #[0:8][0:4][0:4]]";
 template <>
 inline constexpr std::string_view kLayout<map_from_odom_t> = "8 4 24 32 8 1 4";
 template <>
