@@ -61,23 +61,54 @@ void draw_states(const RunRecord& run, double top, double left, double px_per_s,
   }
 }
 
-void draw_faults(const RunRecord& run, double top, double left, double px_per_s, Svg* svg) {
+// A row of the time line: when one counter rose, and by how much in all.
+struct FaultLane {
+  const char* name;
+  std::int64_t total = 0;
+  std::vector<double> times_s;
+};
+
+std::vector<FaultLane> fault_lanes(const RunRecord& run) {
+  std::vector<FaultLane> lanes;
   for (const Fault& fault : kFaults) {
-    for (std::size_t i = 1; i < run.statuses.size(); ++i) {
-      if (run.statuses[i].*fault.count <= run.statuses[i - 1].*fault.count) continue;
-      const double x = left + px_per_s * (seconds_of(run.statuses[i].utime) - run.start_s);
-      svg->line({x, top - 3}, {x, top + 19}, "stroke=\"#000\" stroke-width=\"1.5\"");
-      svg->text({x + 3, top + 30}, fault.name, Anchor::kStart);
+    FaultLane lane{fault.name, 0, {}};
+    std::int64_t before = 0;
+    for (const status_t& status : run.statuses) {
+      const std::int64_t rise = status.*fault.count - before;
+      before = status.*fault.count;
+      if (rise <= 0) continue;
+      lane.total += rise;
+      lane.times_s.push_back(seconds_of(status.utime) - run.start_s);
     }
+    if (lane.total > 0) lanes.push_back(std::move(lane));
+  }
+  return lanes;
+}
+
+constexpr double kStateRow_px = 24, kLane_px = 15;
+
+void draw_faults(const std::vector<FaultLane>& lanes, double top, double left, double px_per_s, Svg* svg) {
+  for (const FaultLane& lane : lanes) {
+    svg->text({left - 8, top + 11}, std::to_string(lane.total) + " " + lane.name, Anchor::kEnd);
+    for (const double t : lane.times_s) {
+      const double x = left + px_per_s * t;
+      svg->line({x, top + 1}, {x, top + 12}, "stroke=\"#000\" stroke-width=\"1.2\"");
+    }
+    top += kLane_px;
   }
 }
 
 std::string time_line(const Runs& runs) {
-  constexpr double kLeft_px = 150, kWidth_px = 1080, kRow_px = 40, kTop_px = 12;
+  constexpr double kLeft_px = 190, kWidth_px = 1080, kTop_px = 12;
   const double end_s = end_of(runs);
   if (end_s <= 0.0) return {};
   const double px_per_s = (kWidth_px - kLeft_px - 20.0) / end_s;
-  const double bottom = kTop_px + kRow_px * static_cast<double>(runs.size());
+  std::vector<std::vector<FaultLane>> faults;
+  double bottom = kTop_px;
+  for (const RunRecord& run : runs) {
+    faults.push_back(fault_lanes(run));
+    bottom += kStateRow_px + kLane_px * static_cast<double>(faults.back().size());
+  }
   Svg svg(kWidth_px, bottom + 62);
   for (const double t : ticks(0.0, end_s, 12, false)) {
     const double x = kLeft_px + px_per_s * t;
@@ -85,13 +116,14 @@ std::string time_line(const Runs& runs) {
     svg.text({x, bottom + 13}, number(t, 1), Anchor::kMiddle);
   }
   svg.text({0.5 * (kLeft_px + kWidth_px), bottom + 29}, "time since the first frame, s", Anchor::kMiddle);
+  double top = kTop_px;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const double top = kTop_px + kRow_px * static_cast<double>(i);
-    svg.text({6, top + 13}, runs[i].name, Anchor::kStart);
+    svg.text({kLeft_px - 8, top + 13}, runs[i].name, Anchor::kEnd, "class=\"title\"");
     draw_states(runs[i], top, kLeft_px, px_per_s, &svg);
-    draw_faults(runs[i], top, kLeft_px, px_per_s, &svg);
+    draw_faults(faults[i], top + 20, kLeft_px, px_per_s, &svg);
+    top += kStateRow_px + kLane_px * static_cast<double>(faults[i].size());
   }
-  double x = kLeft_px;
+  double x = kLeft_px - 60;
   for (const StateLook& state : kStates) {
     svg.rectangle({x, bottom + 40}, {14, 12}, std::string("fill=\"") + state.fill + "\" stroke=\"#333\"");
     svg.text({x + 18, bottom + 50}, state.name, Anchor::kStart);
@@ -189,7 +221,8 @@ std::string health_section(const Runs& runs) {
   if (states.empty()) return {};
   return section(
       "States, faults, queues, memory",
-      "State of each published frame; a black line marks a status message whose fault counter rose.",
+      "State of each published frame; below it, one row a kind of fault: a black line where a status message "
+      "said that its counter had risen.",
       row_of({states, match_view(runs), map_size_view(runs), queue_view(runs), memory_view(runs)}));
 }
 
