@@ -40,6 +40,9 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     if (with_schedule_) publish_schedule(*package);
   }
   note_state(frame_.result);
+  silence_.result = result;
+  silence_.counts = package->counts;
+  silence_.chance = package->chance;
   if (publisher_->has_sinks()) {
     publisher_->publish(ipc::kTimingChannel, result.utime,
                         package->clock.message(result.utime, result.sequence, package->chance.age_us));
@@ -47,10 +50,32 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   return frame_;
 }
 
+const FrameOutput& FrameReporter::report_silence(std::int64_t utime, std::int64_t age_us,
+                                                 const InputCounts& in, const OutputCounts& out) {
+  slam::FrameResult& r = silence_.result;
+  r.utime = utime;
+  r.state = slam::State::kNoCamera;
+  r.has_pose = false;
+  r.quality = -1;
+  r.features = r.matches = r.inliers = r.aligned = 0;
+  r.keyframe = false;
+  silence_.in = in;
+  frame_ = make_frame_output(r, assumed_scale_);
+  frame_.age_us = age_us;
+  for (PoseSink* sink : sinks_) sink->on_frame(frame_);
+  // Its time is that of the news, not of a measurement.
+  frame_.age_us = 0;
+  publisher_->on_frame(frame_);
+  publish_status(silence_, out);
+  note_state(frame_.result);
+  return frame_;
+}
+
 void FrameReporter::publish_status(const FramePackage& package, const OutputCounts& out) {
   fill_status(package, out);
   const bool changed = frame_.result.state != last_state_;
-  const bool on_time = due(frame_.result.utime, status_rate_hz_, &next_status_utime_);
+  const double rate_hz = status_rate_hz_.load(std::memory_order_relaxed);
+  const bool on_time = due(frame_.result.utime, rate_hz, &next_status_utime_);
   if (changed || on_time) publisher_->publish(ipc::kStatusChannel, frame_.result.utime, status_);
 }
 
@@ -86,6 +111,9 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.keyframes_dropped = static_cast<std::int64_t>(counts.keyframes_dropped);
   s.images_wrong_size = in.wrong_size;
   s.images_undecodable = in.undecodable;
+  s.images_missing = in.missing;
+  s.images_flagged = in.flagged;
+  s.camera_losses = in.camera_losses;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
   s.messages_undecodable = in.messages_undecodable;

@@ -4,7 +4,7 @@
 
 namespace farpoint::daemon {
 
-Outputs::Outputs(const Options& options, const Config& config) : options_(options) {
+Outputs::Outputs(const Options& options, const Config& config, Use use) : options_(options), use_(use) {
   try {
     open_files(config);
   } catch (const std::runtime_error& error) {
@@ -59,22 +59,24 @@ void Outputs::open_files(const Config& config) {
 }
 
 void Outputs::open_network(const Config& config) {
-  if (!options_.lcm_url) return;
-  const std::string url = options_.lcm_url->empty() ? config.lcm.url : *options_.lcm_url;
+  const bool live = use_ == Use::kLive;
+  if (!options_.lcm_url && !(live && config.lcm.enabled)) return;
+  const std::string url = options_.lcm_url.value_or("").empty() ? config.lcm.url : *options_.lcm_url;
   try {
     publisher_.add(std::make_unique<LcmMessageSink>(url));
   } catch (const std::runtime_error& error) {
+    if (live) throw;
     spdlog::warn("{}; replay goes on without the network", error.what());
   }
 }
 
 void Outputs::open_bus(const Config& config) {
-  if (!options_.can_interface) return;
+  if (!options_.can_interface && !(use_ == Use::kLive && config.can.enabled)) return;
   try {
     auto bus = std::make_unique<drivers::SocketCan>(bus_name(config));
     make_can(config)->send_on(std::move(bus));
   } catch (const std::runtime_error& error) {
-    spdlog::warn("{}; replay goes on without the bus", error.what());
+    spdlog::warn("{}; the run goes on without the bus", error.what());
   }
 }
 

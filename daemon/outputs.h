@@ -1,4 +1,4 @@
-// Everything that a replay writes or sends. Files appear when close() is called, else not at all.
+// Everything that a run writes or sends. Files appear when close() is called, else not at all.
 #pragma once
 
 #include <memory>
@@ -17,8 +17,12 @@ namespace farpoint::daemon {
 
 class Outputs {
  public:
-  // Throws UsageError where a file cannot be written. A network or bus that cannot be used is only warned of.
-  Outputs(const Options& options, const Config& config);
+  // A replay sends only what its options ask for, and only warns of a network or bus that cannot be used.
+  // Live, the configuration asks, and a network that cannot be used is an error: the service manager tries
+  // again.
+  enum class Use : std::uint8_t { kReplay, kLive };
+  // Throws UsageError where a file cannot be written, std::runtime_error as said above.
+  Outputs(const Options& options, const Config& config, Use use = Use::kReplay);
 
   // The bus first: it is what a controller waits for.
   [[nodiscard]] std::vector<PoseSink*> sinks();
@@ -37,6 +41,7 @@ class Outputs {
   [[nodiscard]] std::string bus_name(const Config& config) const;
 
   const Options& options_;
+  const Use use_;
   std::unique_ptr<ipc::LogWriter> log_;
   std::unique_ptr<LiveTrajectory> live_;
   std::unique_ptr<CanSink> can_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "daemon/config.h"
+#include "daemon/live.h"
 #include "daemon/logging.h"
 #include "daemon/options.h"
 #include "daemon/replay.h"
@@ -51,6 +52,8 @@ int run_checked(int argc, const char* const* argv) {
   const Config config = load_configuration(line.options);
   start_logging(config.log.level);
   make_libraries_single_threaded();
+  if (line.options.replay.empty())
+    return live(line.options, config, [&line] { return load_configuration(line.options); });
   return replay(line.options, config);
 }
 

@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM end a replay between two frames, so that no temporary file is left behind.
+// SIGINT and SIGTERM end a run between two frames, so that no temporary file is left behind.
 #pragma once
 
 #include <csignal>
@@ -21,6 +21,21 @@ class StopOnSignal {
  private:
   using Handler = void (*)(int);
   Handler on_interrupt_, on_terminate_;
+};
+
+// SIGHUP asks for the configuration to be read again.
+class ReloadOnSignal {
+ public:
+  ReloadOnSignal();
+  ~ReloadOnSignal();
+  ReloadOnSignal(const ReloadOnSignal&) = delete;
+  ReloadOnSignal& operator=(const ReloadOnSignal&) = delete;
+
+  // True where one came since the last call.
+  [[nodiscard]] static bool take();
+
+ private:
+  void (*on_hangup_)(int);
 };
 
 }  // namespace farpoint::daemon

@@ -4,11 +4,12 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
-#include "slam/geometry/camera.h"
-#include "slam/geometry/se3.h"
+#include "ipc/message.h"
+#include "slam/config.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
 
 struct CameraFile {
   slam::Camera::Parameters parameters;
@@ -20,4 +21,7 @@ struct CameraFile {
 // Throws InputError naming file, line, key and what was expected.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
 
-}  // namespace farpoint::tools
+// The calibration of a vehicle with this one camera, as a log carries it.
+[[nodiscard]] calibration_t calibration_of(const CameraFile& camera, const std::string& name);
+
+}  // namespace farpoint::daemon

@@ -10,7 +10,7 @@
 
 #include "slam/geometry/se3.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
 
 class YamlFile {
  public:
@@ -47,4 +47,4 @@ class YamlFile {
 // Nearest rigid motion of a 3x3 or 3x4 matrix by rows where it is one to `tolerance`; false elsewhere.
 [[nodiscard]] bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motion);
 
-}  // namespace farpoint::tools
+}  // namespace farpoint::daemon
