@@ -20,6 +20,13 @@ namespace farpoint::daemon {
 
 struct LogConfig {
   std::string level = "info";
+  // Live.
+  std::string file = "none";
+  int file_mb = 10, files = 5;
+};
+
+struct ControlConfig {
+  std::string socket = "/run/farpoint/control";
 };
 
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kMjpeg };
@@ -68,6 +75,8 @@ struct CanConfig {
   bool enabled = false;  // live
   std::string interface = "can0";
   CanPoseFrame frame = CanPoseFrame::kMap;
+  double rate_hz = 0;  // live; 0: with each image only
+  std::string wheels_dbc = "none", wheel_signals = "none";
 };
 
 enum class SchedulingPolicy { kFifo, kRoundRobin };
@@ -90,6 +99,7 @@ struct RealtimeConfig {
 
 struct Config {
   LogConfig log;
+  ControlConfig control;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;

@@ -84,6 +84,11 @@ ConfigKey boolean(const char* name, Field field) {
 std::vector<ConfigKey> make_keys() {
   return {
       choice("log.level", {"debug", "info", "warning", "error"}, FIELD(log.level)),
+      text("log.file", FIELD(log.file)),
+      integer("log.file_mb", "MB", 1, 1000, FIELD(log.file_mb)),
+      integer("log.files", "files", 1, 100, FIELD(log.files)),
+
+      text("control.socket", FIELD(control.socket)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
       text("camera.device", FIELD(camera.device)),
@@ -115,6 +120,9 @@ std::vector<ConfigKey> make_keys() {
       boolean("can.enabled", FIELD(can.enabled)),
       text("can.interface", FIELD(can.interface)),
       enumeration("can.frame", {"map", "odom"}, FIELD(can.frame)),
+      number("can.rate_hz", "Hz", 0, 1000, FIELD(can.rate_hz)),
+      text("can.wheels_dbc", FIELD(can.wheels_dbc)),
+      text("can.wheel_signals", FIELD(can.wheel_signals)),
 
       boolean("realtime.lock_memory", FIELD(realtime.lock_memory)),
       integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),

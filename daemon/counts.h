@@ -15,7 +15,8 @@ struct InputCounts {
 
 // What could not be sent; the bus is counted here because its sink is no message sink.
 struct OutputCounts {
-  std::int64_t can_send_errors = 0;
+  std::int64_t can_send_errors = 0, can_bus_offs = 0, can_received = 0;
+  std::int8_t can_state = 0;  // drivers::CanState
 };
 
 }  // namespace farpoint::daemon

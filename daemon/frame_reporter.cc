@@ -29,7 +29,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   const slam::FrameResult& result = package->result;
   {
     const StageScope scope(&package->clock, timing_t::STAGE_OUTPUT);
-    frame_ = make_frame_output(result, assumed_scale_);
+    frame_ = make_frame_output(since_odom_reset(result), assumed_scale_);
     frame_.age_us = package->chance.age_us;
     ++status_.frames_tracked;
     if (frame_.valid) ++status_.frames_valid;
@@ -40,7 +40,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     if (with_schedule_) publish_schedule(*package);
   }
   note_state(frame_.result);
-  silence_.result = result;
+  silence_.result = since_odom_reset(result);
   silence_.counts = package->counts;
   silence_.chance = package->chance;
   if (publisher_->has_sinks()) {
@@ -48,6 +48,21 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
                         package->clock.message(result.utime, result.sequence, package->chance.age_us));
   }
   return frame_;
+}
+
+slam::FrameResult FrameReporter::since_odom_reset(const slam::FrameResult& result) {
+  if (result.has_pose && reset_odom_.exchange(false, std::memory_order_relaxed)) {
+    T_odom_start_ = result.T_odom_body;
+    ++odom_resets_;
+  }
+  if (odom_resets_ == 0) return result;
+  slam::FrameResult r = result;
+  r.T_odom_body = T_odom_start_.inverse() * result.T_odom_body;
+  // What the map frame says stays as it is: map_from_odom takes up the difference.
+  const slam::Sim3& S = result.map_from_odom;
+  r.map_from_odom = {S.scale, (S.q * T_odom_start_.q).normalized(), S * T_odom_start_.t};
+  r.reset_counter += odom_resets_;
+  return r;
 }
 
 const FrameOutput& FrameReporter::report_silence(std::int64_t utime, std::int64_t age_us,
@@ -119,6 +134,9 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.messages_undecodable = in.messages_undecodable;
   s.log_damages = in.log_damages;
   s.can_send_errors = out.can_send_errors;
+  s.can_bus_offs = out.can_bus_offs;
+  s.can_received = out.can_received;
+  s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors());
   s.maps = static_cast<std::int32_t>(counts.maps);

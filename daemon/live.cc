@@ -10,6 +10,7 @@
 #include "daemon/build_info.h"
 #include "daemon/camera_file.h"
 #include "daemon/camera_source.h"
+#include "daemon/control_socket.h"
 #include "daemon/last_line.h"
 #include "daemon/logging.h"
 #include "daemon/outputs.h"
@@ -108,6 +109,9 @@ class LiveRun {
   void tick(const std::function<Config()>& reload);
   void take_over(const std::function<Config()>& reload);
   void tell_status(double now_s);
+  void open_control();
+  [[nodiscard]] std::string obey(const std::string& command);
+  [[nodiscard]] std::string status_text() const;
   int conclude();
 
   const StopOnSignal stop_;
@@ -118,6 +122,7 @@ class LiveRun {
   ServiceManager manager_;
   Outputs outputs_;
   std::optional<Recorder> recorder_;
+  std::optional<ControlSocket> control_;
   CameraSource source_;
   std::unique_ptr<Session> session_;
   RealtimeReport realtime_;
@@ -136,6 +141,7 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
       session_(make_session()),
       realtime_(config.realtime),
       pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
+  open_control();
   if (options_.record.empty()) return;
   try {
     recorder_.emplace(options_.record, calibration_, config_.camera.index);
@@ -157,6 +163,15 @@ std::unique_ptr<Session> LiveRun::make_session() {
   } catch (const std::bad_alloc&) {
     throw ConfigError(
         "configuration: not enough memory for the keys of section capacity, expected smaller ones");
+  }
+}
+
+void LiveRun::open_control() {
+  if (config_.control.socket == "none") return;
+  try {
+    control_.emplace(config_.control.socket);
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; the run goes on without commands", error.what());
   }
 }
 
@@ -208,6 +223,7 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
 void LiveRun::tick(const std::function<Config()>& reload) {
   for (drivers::CameraEvent event; source_.take_event(&event);) say(event, config_.camera.device);
   if (ReloadOnSignal::take()) take_over(reload);
+  if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
   manager_.watch(now_s, [this] { return pipeline_.has_progressed(); });
   if (const slam::State state = pipeline_.state(); state != state_said_) {
@@ -219,12 +235,30 @@ void LiveRun::tick(const std::function<Config()>& reload) {
 
 void LiveRun::tell_status(double now_s) {
   next_status_s_ = now_s + kStatusEvery_s;
-  manager_.status(fmt::format("{}, {} frames tracked, {} dropped", to_string(pipeline_.state()),
-                              pipeline_.frames_tracked(), pipeline_.frames_dropped()));
+  manager_.status(status_text());
   if (!recorder_ || recorder_->left_out() == left_out_said_) return;
   left_out_said_ = recorder_->left_out();
   spdlog::warn("{}: {} images left out so far: the disk cannot follow, or is full", options_.record,
                left_out_said_);
+}
+
+std::string LiveRun::status_text() const {
+  return fmt::format("{}, {} frames tracked, {} dropped", to_string(pipeline_.state()),
+                     pipeline_.frames_tracked(), pipeline_.frames_dropped());
+}
+
+std::string LiveRun::obey(const std::string& command) {
+  if (command == "status") return "ok " + status_text();
+  spdlog::info("command: {}", command.substr(0, 40));
+  if (command == "reset-odom") {
+    session_->reporter().reset_odom();
+    return "ok the next pose is the origin of odom";
+  }
+  if (command == "stop") {
+    StopOnSignal::ask();
+    return "ok stopping";
+  }
+  return "error: unknown command, expected status, reset-odom or stop";
 }
 
 void LiveRun::take_over(const std::function<Config()>& reload) {

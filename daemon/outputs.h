@@ -27,7 +27,11 @@ class Outputs {
   // The bus first: it is what a controller waits for.
   [[nodiscard]] std::vector<PoseSink*> sinks();
   [[nodiscard]] Publisher* publisher() { return &publisher_; }
-  [[nodiscard]] OutputCounts counts() const { return {can_ ? can_->errors() : 0}; }
+  [[nodiscard]] OutputCounts counts() const;
+  // Live, on the output's thread, between the frames.
+  void tick(double now_s);
+  // Whether tick() is wanted more often than images come.
+  [[nodiscard]] bool is_steady() const { return can_ && can_->is_steady(); }
 
   // Puts every file in its place; returns their names. Throws std::runtime_error where something was not
   // stored. Warns of what was not sent.
@@ -37,6 +41,7 @@ class Outputs {
   void open_files(const Config& config);
   void open_network(const Config& config);
   void open_bus(const Config& config);
+  [[nodiscard]] drivers::CanOptions read_wheels(const Config& config);
   CanSink* make_can(const Config& config);
   [[nodiscard]] std::string bus_name(const Config& config) const;
 
@@ -46,6 +51,7 @@ class Outputs {
   std::unique_ptr<LiveTrajectory> live_;
   std::unique_ptr<CanSink> can_;
   Publisher publisher_;
+  wheels_t wheels_{};
 };
 
 }  // namespace farpoint::daemon

@@ -14,8 +14,9 @@ namespace {
 
 // How often output looks for a frame that is being tracked: what it may add to the frame's age.
 constexpr std::int64_t kLookEvery_us = 200;
-// With a camera, output looks whether it has fallen silent.
-constexpr std::int64_t kSilenceLooksEvery_us = 20'000;
+// With a camera, output looks whether it has fallen silent and what has come from the bus; more often where
+// it has to send between the images.
+constexpr std::int64_t kIdleLooksEvery_us = 20'000, kSteadyLooksEvery_us = 1'000;
 // Output wakes mapping; should output be held up by a disk, mapping looks for itself.
 constexpr std::int64_t kMappingLooksEvery_us = 10'000;
 constexpr std::int64_t kWatchEvery_us = 20'000;
@@ -44,7 +45,7 @@ Pipeline::Pipeline(const Config& config, const PipelineOptions& options, Capture
 
 void Pipeline::run(const ThreadHooks& hooks) {
   hooks_ = hooks;
-  last_report_s_ = steady_s();
+  last_image_s_.store(steady_s(), std::memory_order_relaxed);
   {
     Thread mapping(kMappingThread, config_, config_.mapping, options_.realtime, [this] { map(); });
     Thread tracking(kTrackingThread, config_, config_.tracking, options_.realtime, [this] { track(); });
@@ -91,6 +92,7 @@ void Pipeline::capture_until_end() {
     if (status == CaptureStatus::kEnd) return;
     note_presence(status, image->in);
     if (status != CaptureStatus::kImage) continue;
+    last_image_s_.store(steady_s(), std::memory_order_relaxed);
     images_.push();
     arrived_.notify();
     if (hooks_.on_captured) hooks_.on_captured();
@@ -185,8 +187,8 @@ void Pipeline::output() {
       break;
     } else {
       report_silence_if_due();
-      const bool may_fall_silent = options_.no_camera_after_s > 0.0;
-      const std::int64_t idle_us = may_fall_silent ? kSilenceLooksEvery_us : Notifier::kNoLimit;
+      const std::int64_t live_us = outputs_.is_steady() ? kSteadyLooksEvery_us : kIdleLooksEvery_us;
+      const std::int64_t idle_us = is_live() ? live_us : Notifier::kNoLimit;
       arrived_.wait(seen, in_work ? kLookEvery_us : idle_us);
     }
   }
@@ -206,7 +208,6 @@ void Pipeline::report_one(FramePackage* package) {
   const FrameOutput& frame = session_.reporter().report(package, outputs_.counts());
   state_.store(frame.result.state, std::memory_order_relaxed);
   last_in_ = package->in;
-  last_report_s_ = steady_s();
   next_silence_s_ = 0.0;
   if (!notes_.push({frame.result, frame.valid, cpu_ms, package->progress}))
     not_noted_.fetch_add(1, std::memory_order_relaxed);
@@ -214,18 +215,22 @@ void Pipeline::report_one(FramePackage* package) {
 }
 
 void Pipeline::report_silence_if_due() {
-  if (options_.no_camera_after_s <= 0.0) return;
+  if (!is_live()) return;
   const double now_s = steady_s();
+  outputs_.tick(now_s);
+  // A frame that is being tracked will speak for itself.
+  if (frames_in_work()) return;
   const bool away = away_.load(std::memory_order_acquire);
   while (const InputCounts* counts = counts_of_absence_.front()) {
     last_in_ = *counts;
     counts_of_absence_.pop();
   }
-  if (!away && now_s - last_report_s_ < options_.no_camera_after_s) return;
+  const double silent_s = now_s - last_image_s_.load(std::memory_order_relaxed);
+  if (!away && silent_s < options_.no_camera_after_s) return;
   if (now_s < next_silence_s_) return;
   next_silence_s_ = now_s + silence_period_s_;
   const auto utime = static_cast<std::int64_t>(std::llround(1e6 * now_s));
-  const auto age_us = static_cast<std::int64_t>(std::llround(1e6 * (now_s - last_report_s_)));
+  const auto age_us = static_cast<std::int64_t>(std::llround(1e6 * silent_s));
   const FrameOutput& frame = session_.reporter().report_silence(utime, age_us, last_in_, outputs_.counts());
   state_.store(frame.result.state, std::memory_order_relaxed);
   if (hooks_.on_output) hooks_.on_output(frame);

@@ -91,6 +91,7 @@ class Pipeline {
   void watch();
   void take_notes(class Progress* progress);
   [[nodiscard]] bool frames_in_work() const;
+  [[nodiscard]] bool is_live() const { return options_.no_camera_after_s > 0.0; }
 
   const RealtimeConfig config_;
   const PipelineOptions options_;
@@ -113,6 +114,7 @@ class Pipeline {
   std::atomic<std::int64_t> tracked_{0};  // frames that tracking has done
   std::atomic<std::int64_t> not_published_{0}, not_noted_{0};
   std::atomic<slam::State> state_{slam::State::kStarting};  // published last
+  std::atomic<double> last_image_s_{0.0};                   // steady clock; the run's start before the first
   std::atomic<bool> away_{false};                           // the source knows that there is no camera
   std::atomic<bool> stop_{false}, tracking_ended_{false}, output_ended_{false};
   std::exception_ptr capture_error_;  // read after capture's end
@@ -120,7 +122,7 @@ class Pipeline {
   // Output's.
   const Thread* tracking_thread_ = nullptr;  // of which output reads the CPU time
   double tracking_cpu_s_ = 0;
-  double last_report_s_ = 0, next_silence_s_ = 0;
+  double next_silence_s_ = 0;
   InputCounts last_in_;
   // The calling thread's.
   std::int64_t turns_seen_ = -1, tracked_seen_ = -1;

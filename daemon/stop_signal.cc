@@ -27,6 +27,10 @@ StopOnSignal::~StopOnSignal() {
   std::signal(SIGTERM, on_terminate_);
 }
 
+void StopOnSignal::ask() {
+  note(SIGTERM);
+}
+
 int StopOnSignal::signal() {
   return stop_signal;
 }

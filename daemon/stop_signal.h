@@ -15,6 +15,8 @@ class StopOnSignal {
 
   // The signal that came, 0 for none.
   [[nodiscard]] static int signal();
+  // As if SIGTERM had come.
+  static void ask();
   // Throws std::runtime_error where one came.
   static void check();
 

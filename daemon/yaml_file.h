@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "slam/geometry/se3.h"
+#include "slam/config.h"
 
 namespace farpoint::daemon {
 
