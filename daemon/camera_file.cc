@@ -23,10 +23,7 @@ slam::SE3 forward_looking() {
   return {Eigen::Quaterniond(R_body_camera).normalized(), Eigen::Vector3d::Zero()};
 }
 
-}  // namespace
-
-CameraFile read_camera_file(const std::filesystem::path& file) {
-  const YamlFile yaml(file);
+CameraFile read_camera(const YamlFile& yaml) {
   yaml.allow_only({"model", "width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
                    "T_body_camera", "rate_hz", "row_time_s"});
   CameraFile camera;
@@ -43,7 +40,7 @@ CameraFile read_camera_file(const std::filesystem::path& file) {
       yaml.numbers("distortion", radtan ? std::vector<std::size_t>{0, 4, 5} : std::vector<std::size_t>{4});
   std::copy(distortion.begin(), distortion.end(), p.distortion.begin());
   const std::string complaint = slam::Camera::check(p);
-  if (!complaint.empty()) throw InputError(file.string() + ": " + complaint);
+  if (!complaint.empty()) throw InputError(yaml.path().string() + ": " + complaint);
 
   if (yaml.has("T_body_camera")) {
     camera.T_body_camera = yaml.rigid_motion(yaml.require("T_body_camera"), "T_body_camera");
@@ -56,6 +53,16 @@ CameraFile read_camera_file(const std::filesystem::path& file) {
               "expected row_time_s in seconds, at most 0.001 (0: global, negative: unknown)");
   }
   return camera;
+}
+
+}  // namespace
+
+CameraFile read_camera_file(const std::filesystem::path& file) {
+  return read_camera(YamlFile(file));
+}
+
+CameraFile parse_camera_file(const std::string& content, const std::filesystem::path& file) {
+  return read_camera(YamlFile(file, content));
 }
 
 calibration_t calibration_of(const CameraFile& camera, const std::string& name) {

@@ -20,6 +20,8 @@ struct CameraFile {
 
 // Throws InputError naming file, line, key and what was expected.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
+// The same for a file's content that is at hand; `file` is for complaints.
+[[nodiscard]] CameraFile parse_camera_file(const std::string& content, const std::filesystem::path& file);
 
 // The calibration of a vehicle with this one camera, as a log carries it.
 [[nodiscard]] calibration_t calibration_of(const CameraFile& camera, const std::string& name);

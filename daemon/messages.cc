@@ -243,6 +243,39 @@ trajectory_t make_trajectory(const RunEnd& end) {
   return m;
 }
 
+landmarks_t make_landmarks(const RunEnd& end) {
+  landmarks_t m{};
+  m.utime = end.utime;
+  m.scale_state = static_cast<std::int8_t>(end.last.scale);
+  for (const slam::LandmarkInfo& info : end.landmarks) {
+    if (!info.full || !(info.inverse_depth > 0.0)) continue;
+    landmark_t l{};
+    l.map_id = info.map_id;
+    l.through_vmp = info.through_vmp ? 1 : 0;
+    l.anchor_utime = info.anchor_utime;
+    l.anchor_camera = info.anchor_camera;
+    for (int i = 0; i < 2; ++i) l.anchor_pixel[i] = static_cast<float>(info.anchor_pixel[i]);
+    set_position(info.anchor_map * end.unit_scale, l.anchor_position);
+    set_position(info.position_map * end.unit_scale, l.position);
+    l.distance = end.unit_scale / info.inverse_depth;
+    l.relative_sigma = static_cast<float>(info.inverse_depth_sigma / info.inverse_depth);
+    l.created_utime = info.created_utime;
+    l.creation_depth = static_cast<float>(info.creation_depth * end.unit_scale);
+    l.creation_relative_sigma = static_cast<float>(info.creation_relative_sigma);
+    if (const auto seen = end.sightings.find(info.id); seen != end.sightings.end()) {
+      for (const Sighting& s : seen->second) {
+        l.sighting_utime.push_back(s.utime);
+        l.sighting_u.push_back(s.pixel.x());
+        l.sighting_v.push_back(s.pixel.y());
+      }
+    }
+    l.nsightings = static_cast<std::int32_t>(l.sighting_utime.size());
+    m.landmarks.push_back(std::move(l));
+  }
+  m.nlandmarks = static_cast<std::int32_t>(m.landmarks.size());
+  return m;
+}
+
 summary_t make_summary(const RunEnd& end, const Config& config) {
   summary_t s{};
   s.utime = end.utime;

@@ -93,6 +93,10 @@ const RunEnd& Session::finish(const InputCounts& in) {
       if (end_.trajectories[i].map_id == map_id) end_.observation_distances[i].push_back(distance);
     }
   });
+  estimator_.visit_sightings([&](std::uint64_t id, std::int64_t utime, const Eigen::Vector2f& pixel) {
+    end_.sightings[id].push_back({utime, pixel});
+  });
+  publisher_->publish_result(ipc::kLandmarksChannel, end_.utime, make_landmarks(end_));
   publisher_->publish_result(ipc::kTrajectoryChannel, end_.utime, make_trajectory(end_));
   summary_t summary = make_summary(end_, config_);
   summary.times_backwards = in.times_backwards;

@@ -27,8 +27,9 @@ std::string read_file(const std::filesystem::path& file) {
 
 }  // namespace
 
-YamlFile::YamlFile(std::filesystem::path file) : path_(std::move(file)) {
-  const std::string content = read_file(path_);
+YamlFile::YamlFile(std::filesystem::path file) : YamlFile(file, read_file(file)) {}
+
+YamlFile::YamlFile(std::filesystem::path file, const std::string& content) : path_(std::move(file)) {
   try {
     root_ = YAML::Load(content);
   } catch (const YAML::Exception& e) {

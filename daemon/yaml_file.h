@@ -16,6 +16,8 @@ class YamlFile {
  public:
   // Throws InputError where the file cannot be read, is no YAML, or its top is no map.
   explicit YamlFile(std::filesystem::path file);
+  // The same for content that is at hand; `file` is for complaints.
+  YamlFile(std::filesystem::path file, const std::string& content);
 
   [[nodiscard]] const YAML::Node& root() const { return root_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }

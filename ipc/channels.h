@@ -19,7 +19,9 @@ inline constexpr char kImuChannel[] = "IMU";                         // imu_t
 inline constexpr char kWheelsChannel[] = "WHEELS";                   // wheels_t
 inline constexpr char kCalibrationChannel[] = "CALIBRATION";         // calibration_t
 inline constexpr char kGroundTruthChannel[] = "GROUND_TRUTH";        // ground_truth_t
+inline constexpr char kSimulationChannel[] = "SIMULATION";           // simulation_t, of a simulated recording
 inline constexpr char kTrajectoryChannel[] = "FARPOINT_TRAJECTORY";  // trajectory_t, once, at the end
+inline constexpr char kLandmarksChannel[] = "FARPOINT_LANDMARKS";    // landmarks_t, once, at the end
 inline constexpr char kSummaryChannel[] = "FARPOINT_SUMMARY";        // summary_t, once, at the end
 
 // What goes to UDP by default: one host.

@@ -188,6 +188,18 @@ bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us,
   return true;
 }
 
+bool LogWriter::flush() {
+  if (!error_.empty() || log_ == nullptr) return false;
+  if (std::fflush(log_->f) != 0) error_ = std::strerror(errno);
+  return error_.empty();
+}
+
+std::string LogWriter::keep_incomplete() {
+  if (log_ != nullptr) lcm_eventlog_destroy(log_);
+  log_ = nullptr;
+  return path_.keep_as(".incomplete");
+}
+
 void LogWriter::close() {
   if (log_ == nullptr) return;
   if (error_.empty()) error_ = flush_to_disk(log_->f);

@@ -102,6 +102,12 @@ class LogWriter {
   // full): the target is then as it was before.
   void close();
 
+  // Hands what was written so far to the system, so that a killed program leaves it. False as for write().
+  bool flush();
+  // Ends a log that could not be completed, and keeps it beside the target as <target>.incomplete; the target
+  // stays as it was. Empty where there is nothing to keep (a device or a pipe), else the kept file's path.
+  std::string keep_incomplete();
+
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] std::uint64_t events() const { return events_; }
 

@@ -17,11 +17,13 @@
 #include "farpoint/ground_truth_t.hpp"
 #include "farpoint/image_t.hpp"
 #include "farpoint/imu_t.hpp"
+#include "farpoint/landmarks_t.hpp"
 #include "farpoint/map_from_odom_t.hpp"
 #include "farpoint/map_t.hpp"
 #include "farpoint/odometry_t.hpp"
 #include "farpoint/pose_t.hpp"
 #include "farpoint/schedule_t.hpp"
+#include "farpoint/simulation_t.hpp"
 #include "farpoint/status_t.hpp"
 #include "farpoint/summary_t.hpp"
 #include "farpoint/timing_t.hpp"
@@ -46,6 +48,9 @@ inline constexpr std::string_view kLayout<image_t> = "16 12 12 4 #[0:1]";
 template <>
 inline constexpr std::string_view kLayout<imu_t> = "8 24 24 8";
 template <>
+inline constexpr std::string_view kLayout<landmarks_t> =
+    "8 1 #[0: 4 1 8 4 8 24 24 8 4 8 4 4 #[0:8][0:4][0:4]]";
+template <>
 inline constexpr std::string_view kLayout<map_from_odom_t> = "8 4 24 32 8 1 4";
 template <>
 inline constexpr std::string_view kLayout<map_t> = "8 4 1#[0:4][0:4][0:4][0:4][0:1][0:1]#[1:8][1:56]";
@@ -55,6 +60,8 @@ template <>
 inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
 template <>
 inline constexpr std::string_view kLayout<schedule_t> = "40 16 8";
+template <>
+inline constexpr std::string_view kLayout<simulation_t> = "8 4 sss 8 8 4 4 1";
 template <>
 inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 40 88 41 16 8 24 8 ssss";
 template <>

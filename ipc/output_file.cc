@@ -48,7 +48,15 @@ ReplacedPath::ReplacedPath(std::string target) : target_(std::move(target)) {
 }
 
 ReplacedPath::~ReplacedPath() {
-  if (!committed_ && writable_.size() > target_.size() && target_ != "-") unlink(writable_.c_str());
+  if (!committed_ && has_temporary()) unlink(writable_.c_str());
+}
+
+std::string ReplacedPath::keep_as(const std::string& suffix) {
+  if (committed_ || !has_temporary()) return {};
+  std::string kept = target_ + suffix;
+  if (std::rename(writable_.c_str(), kept.c_str()) != 0) return {};
+  committed_ = true;
+  return kept;
 }
 
 void ReplacedPath::commit() {

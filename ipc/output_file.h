@@ -22,8 +22,13 @@ class ReplacedPath {
   [[nodiscard]] const std::string& writable() const { return writable_; }  // open this one
   // Throws std::runtime_error where the rename fails.
   void commit();
+  // Keeps the temporary as the target's name with `suffix` instead, and gives that name; the target stays as
+  // it was. Empty where there is no temporary (a device or a pipe) or it cannot be renamed.
+  std::string keep_as(const std::string& suffix);
 
  private:
+  [[nodiscard]] bool has_temporary() const { return writable_.size() > target_.size() && target_ != "-"; }
+
   std::string target_, writable_;
   bool committed_ = false;
 };

@@ -165,6 +165,11 @@ std::vector<LandmarkInfo> Estimator::landmarks() const {
     i.through_vmp = l.through_vmp;
     i.full = l.state != LandmarkState::kBearing;
     i.observations = static_cast<int>(l.observations.size());
+    i.anchor_utime = l.anchor_utime;
+    i.anchor_camera = l.host_camera;
+    i.anchor_pixel = l.host_pixel;
+    i.anchor_map = map.T_world_anchor(l).t;
+    i.created_utime = map.utime_of(l.created_keyframe);
     std::memcpy(&i.tag, l.patch.pixels.data(), sizeof(i.tag));
     out.push_back(i);
   });
@@ -178,6 +183,14 @@ void Estimator::visit_observation_distances(const std::function<void(std::int32_
     const Eigen::Vector4d p = map.world_point(l);
     for (const Observation& o : l.observations)
       visit(l.map_id, (p.head<3>() / p[3] - map.T_world_camera(map.keyframes()[o.keyframe]).t).norm());
+  });
+}
+
+void Estimator::visit_sightings(
+    const std::function<void(std::uint64_t, std::int64_t, const Eigen::Vector2f&)>& visit) const {
+  const Map& map = impl_->mapping.mapper().map();
+  map.landmarks().for_each([&](LandmarkHandle, const Landmark& l) {
+    for (const Observation& o : l.observations) visit(l.id, map.keyframes()[o.keyframe].utime, o.pixel);
   });
 }
 

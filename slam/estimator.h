@@ -115,7 +115,13 @@ struct LandmarkInfo {
   bool through_vmp = false;
   bool full = false;  // else bearing or weak
   int observations = 0;
-  std::uint64_t tag = 0;  // simulator: which true point the host patch shows; 0 elsewhere
+  // Where its bearing comes from: the first frame that saw it, the pixel there, and that camera's centre.
+  std::int64_t anchor_utime = 0;
+  int anchor_camera = 0;
+  Eigen::Vector2d anchor_pixel = Eigen::Vector2d::Zero();
+  Eigen::Vector3d anchor_map = Eigen::Vector3d::Zero();  // map units
+  std::int64_t created_utime = 0;  // of the keyframe at which it became a point; bearings: when it was made
+  std::uint64_t tag = 0;           // simulator: which true point the host patch shows; 0 elsewhere
 };
 
 // Camera 0's calibration as refined from the map, relative to the given one; zero where refinement is off.
@@ -177,6 +183,9 @@ class Estimator {
   // camera-to-point distance in map units.
   void visit_observation_distances(
       const std::function<void(std::int32_t map_id, double distance)>& visit) const;
+  // Calls visit(landmark_id, utime, pixel) for every sighting of every landmark, in ascending time for each.
+  void visit_sightings(const std::function<void(std::uint64_t landmark_id, std::int64_t utime,
+                                                const Eigen::Vector2f& pixel)>& visit) const;
   [[nodiscard]] std::vector<SE3> keyframe_poses() const;
   [[nodiscard]] CalibrationInfo calibration() const;
   // Bytes of every pool, for the table printed at start.

@@ -44,7 +44,8 @@ struct Landmark {
   Eigen::Matrix<double, 3, 2> d_bearing_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();  // at the host pixel
   Eigen::Vector2d host_pixel = Eigen::Vector2d::Zero();  // level-0 pixel of the anchor camera
   int host_camera = 0;
-  double inverse_depth = 0;  // rho >= 0, 1 / distance along f, 1 / map units
+  std::int64_t anchor_utime = 0;  // of the frame that host_pixel was seen in
+  double inverse_depth = 0;       // rho >= 0, 1 / distance along f, 1 / map units
   double inverse_depth_sigma = 0;
   double max_parallax_rad = 0;       // largest angle between the host's ray and another observer's
   KeyframeHandle parallax_keyframe;  // the observer that gives it, with the host the best pair

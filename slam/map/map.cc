@@ -21,7 +21,7 @@ KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   slot.landmarks.assign(slot.set.features.size(), {});
   slot.covisible.clear();
   slot.optimised = 0;
-  skeleton_.push_back({handle, 0, {}, true});
+  skeleton_.push_back({handle, 0, {}, true, slot.utime});
   return handle;
 }
 
@@ -81,6 +81,7 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   l.T_host_anchor = camera.T_body_camera;
   l.host_camera = keyframe.camera;
   l.host_pixel = {f.u_px, f.v_px};
+  l.anchor_utime = keyframe.utime;
   if (!set_bearing(&l)) {
     landmarks_.release(handle);
     return {};

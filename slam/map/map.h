@@ -68,6 +68,11 @@ class Map {
   // keyframe ever made in a living map by its id, also of removed ones; false where it is unknown.
   [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const;
 
+  // When any keyframe ever made was taken, by its id. Precondition: there has been such a keyframe.
+  [[nodiscard]] std::int64_t utime_of(std::uint64_t keyframe_id) const {
+    return skeleton_[keyframe_id - 1].utime;
+  }
+
   // Everything of one map goes (a map that never came to life).
   void discard_map(std::int32_t map_id);
 
@@ -84,6 +89,7 @@ class Map {
     std::uint64_t parent_id = 0;
     SE3 T_parent_this;
     bool known = false;
+    std::int64_t utime = 0;  // of the keyframe
   };
 
   bool set_bearing(Landmark* landmark) const;

@@ -199,8 +199,9 @@ void random_content(std::string_view layout, std::mt19937_64& rng, Bytes* out) {
 template <typename Message>
 class EveryMessage : public testing::Test {};
 
-using AllMessages = testing::Types<calibration_t, ground_truth_t, image_t, imu_t, map_from_odom_t, map_t,
-                                   odometry_t, pose_t, status_t, summary_t, timing_t, trajectory_t, wheels_t>;
+using AllMessages =
+    testing::Types<calibration_t, ground_truth_t, image_t, imu_t, landmarks_t, map_from_odom_t, map_t,
+                   odometry_t, pose_t, simulation_t, status_t, summary_t, timing_t, trajectory_t, wheels_t>;
 TYPED_TEST_SUITE(EveryMessage, AllMessages);
 
 template <typename Message>

@@ -15,6 +15,8 @@ void add_evaluate_command(CLI::App* app, Action* action);
 void add_bench_command(CLI::App* app, Action* action);
 void add_ctl_command(CLI::App* app, Action* action);
 void add_top_command(CLI::App* app, Action* action);
+void add_report_command(CLI::App* app, Action* action);
+void add_simulate_command(CLI::App* app, Action* action);
 
 // The whole program: parses, runs, and turns every failure into one line on standard error and an exit
 // status.

@@ -19,7 +19,7 @@ struct EvaluateOptions {
   std::string truth, align, truth_point = "auto", segments;
   std::vector<std::string> expectations;
   std::int64_t frames = 0;
-  bool planar = false, json = false;
+  bool planar = false, json = false, without_landmarks = false;
 };
 
 const std::map<std::string, Alignment> kAlignments = {
@@ -100,7 +100,7 @@ void print_text(const std::vector<RunMetrics>& runs) {
 
 int run_evaluate(const EvaluateOptions& options) {
   const EvaluationOptions evaluation = to_evaluation_options(options);
-  const Truth truth = read_truth(options.truth);
+  const Truth truth = read_truth(options.truth, !options.without_landmarks);
   std::vector<RunMetrics> runs;
   for (const std::string& file : options.runs)
     runs.push_back(evaluate_run(read_run(file), truth, evaluation));
@@ -132,6 +132,9 @@ void add_evaluate_command(CLI::App* app, Action* action) {
           "extrinsics), or auto (default): camera0 where the run's scale is unknown, since its body then\n"
           "stands at camera 0, else body. A TUM run aligned by sim3 counts as of unknown scale")
       ->check(CLI::IsMember({"auto", "body", "camera0"}));
+  command->add_flag("--without-landmarks", options->without_landmarks,
+                    "Do not judge landmarks by a simulated recording's world (it is made again, which takes\n"
+                    "some seconds)");
   command
       ->add_option("--frames", options->frames,
                    "Frames of the recording, for the share (default: from the truth's log)")
@@ -160,6 +163,8 @@ void add_evaluate_command(CLI::App* app, Action* action) {
       "  depth  when a point was made; distance: over all observations of the final map; metres by the "
       "alignment\n"
       "  VMP %  points made through a virtual map point, of all points made\n"
+      "  landmarks  against a simulated recording's world: distance from the camera that first saw each, in\n"
+      "         metres by the scale of the six seconds around; error/claim is 1 where sigmas are honest\n"
       "Examples:\n"
       "  farpoint evaluate run.lcm --truth kitti03.lcm\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --segments 0:70,110:400\n"

@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "ipc/output_file.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
+#include "tools/common/text_file.h"
 #include "tools/evaluate/log_input.h"
 
 namespace farpoint::tools {
@@ -45,19 +45,6 @@ Trajectory trajectory_of(const ExportOptions& options) {
   return std::move(log.live_trajectory);
 }
 
-void write(const std::string& file, const std::string& text) {
-  const auto open = [&] {
-    try {
-      return std::make_unique<ipc::OutputFile>(file);
-    } catch (const std::runtime_error& e) {
-      throw InputError(e.what());
-    }
-  };
-  const std::unique_ptr<ipc::OutputFile> output = open();
-  std::fwrite(text.data(), 1, text.size(), output->stream());
-  output->close();
-}
-
 int run_export(const ExportOptions& options) {
   if (options.truth == !options.trajectory.empty()) {
     throw InputError("export: expected either --truth or --trajectory final|live");
@@ -68,7 +55,7 @@ int run_export(const ExportOptions& options) {
       throw InputError("--origin first: the truth has positions only, expected orientation too");
     start_at_origin(&trajectory);
   }
-  write(options.output, to_tum(trajectory));
+  write_file(options.output, to_tum(trajectory));
   if (options.output != "-") std::printf("%s: %zu poses\n", options.output.c_str(), trajectory.poses.size());
   return kExitDone;
 }

@@ -3,10 +3,13 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <memory>
 
+#include "ipc/output_file.h"
 #include "tools/common/errors.h"
 
 namespace farpoint::tools {
@@ -109,6 +112,19 @@ std::string read_file(const std::filesystem::path& file) {
   stream.read(content.data(), static_cast<std::streamsize>(content.size()));
   if (!stream) throw InputError(file.string() + ": cannot be read to its end");
   return content;
+}
+
+void write_file(const std::string& file, const std::string& text) {
+  const auto open = [&] {
+    try {
+      return std::make_unique<ipc::OutputFile>(file);
+    } catch (const std::runtime_error& e) {
+      throw InputError(e.what());
+    }
+  };
+  const std::unique_ptr<ipc::OutputFile> output = open();
+  std::fwrite(text.data(), 1, text.size(), output->stream());
+  output->close();
 }
 
 }  // namespace farpoint::tools

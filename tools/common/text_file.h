@@ -60,5 +60,8 @@ inline constexpr std::string_view kCommaAndBlanks = ", \t";
 
 // The whole file as bytes. Throws InputError.
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
+// Puts the text in the file's place, through a temporary file; "-" is standard output. Throws InputError
+// where the file cannot be opened, std::runtime_error where it cannot be written.
+void write_file(const std::string& file, const std::string& text);
 
 }  // namespace farpoint::tools

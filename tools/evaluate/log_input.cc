@@ -67,6 +67,7 @@ class RecordingCollector {
     if (event.channel == "CAMERA_0") return add_frame(event);
     if (event.channel == ipc::kGroundTruthChannel) return add_truth(event);
     if (event.channel == ipc::kCalibrationChannel) return add_calibration(event);
+    if (event.channel == ipc::kSimulationChannel) return ipc::decode(event.data, &log_.simulation.emplace());
     return true;
   }
   RecordingLog finish() {
@@ -106,6 +107,7 @@ class RunCollector {
     if (event.channel == ipc::kPoseChannel) return add_pose(event);
     if (event.channel == ipc::kTimingChannel) return add_timing(event);
     if (event.channel == ipc::kTrajectoryChannel) return add_trajectory(event);
+    if (event.channel == ipc::kLandmarksChannel) return ipc::decode(event.data, &log_.landmarks.emplace());
     if (event.channel == ipc::kSummaryChannel) return add_summary(event);
     return true;
   }

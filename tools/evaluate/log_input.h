@@ -20,6 +20,7 @@ struct RecordingLog {
   std::optional<calibration_t> calibration;  // the first one
   Trajectory truth;                          // T_world_body, ascending; may be empty
   std::vector<std::int64_t> frame_utimes;    // of CAMERA_0, ascending
+  std::optional<simulation_t> simulation;    // of a simulated recording
 
   // T_body_camera of camera 0; identity where the log has no calibration.
   [[nodiscard]] slam::SE3 T_body_camera0() const;
@@ -37,6 +38,7 @@ struct RunLog {
   std::int8_t scale_state = 0;  // status_t.SCALE_*
   std::int32_t resets = 0;      // highest reset counter published
   std::optional<summary_t> summary;
+  std::optional<landmarks_t> landmarks;
   std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
   std::vector<double> frame_ms;     // the same of the whole frame, mapping included where it runs in step
   std::int64_t deadline_misses = 0;

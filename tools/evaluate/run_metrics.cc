@@ -113,6 +113,15 @@ void add_summary(const summary_t& summary, RunMetrics* metrics) {
   if (absolute) metrics->depth = depth_metrics(summary.maps[0], absolute->scale);
 }
 
+void add_landmarks(const RunLog& log, const Trajectory& truth_at_point, SimulatedWorld* world,
+                   RunMetrics* metrics) {
+  const std::optional<AbsoluteError>& absolute = metrics->final_metrics.absolute;
+  if (!log.landmarks || !absolute || log.final_trajectory.poses.empty()) return;
+  metrics->judged = world->judge(*log.landmarks, log.final_trajectory.poses.front().map_id,
+                                 pair_nearest(truth_at_point, log.final_trajectory), absolute->map_to_world);
+  metrics->landmarks = measure_landmarks(metrics->judged);
+}
+
 // Time range of a segment: by the recording's frames where they are known, else by the estimate's own poses.
 std::pair<double, double> segment_times(const FrameRange& range, const Truth& truth,
                                         const Trajectory& estimate) {
@@ -219,7 +228,7 @@ Json segments_to_json(const std::vector<SegmentScale>& segments) {
 
 }  // namespace
 
-Truth read_truth(const std::filesystem::path& file) {
+Truth read_truth(const std::filesystem::path& file, bool with_world) {
   Truth truth;
   if (!is_lcm_log(file)) {
     truth.body = read_tum(file);
@@ -233,6 +242,7 @@ Truth read_truth(const std::filesystem::path& file) {
   truth.names_body = log.calibration && !log.calibration->body_name.empty();
   truth.body = std::move(log.truth);
   truth.frame_utimes = std::move(log.frame_utimes);
+  if (with_world && log.simulation) truth.world = std::make_shared<SimulatedWorld>(*log.simulation);
   return truth;
 }
 
@@ -277,6 +287,7 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
   if (!run.log->tracking_ms.empty() || !run.log->frame_ms.empty())
     metrics.deadline_misses = run.log->deadline_misses;
   if (run.log->summary) add_summary(*run.log->summary, &metrics);
+  if (truth.world) add_landmarks(*run.log, truth_at_point, truth.world.get(), &metrics);
   return metrics;
 }
 
@@ -301,6 +312,7 @@ Json to_json(const RunMetrics& metrics) {
   json.set("observation_distance_m", metrics.depth ? to_json(metrics.depth->observation_m) : Json());
   json.set("map_points", or_null(metrics.map_points));
   json.set("vmp_percent", or_null(metrics.vmp_percent));
+  json.set("landmarks", metrics.landmarks ? to_json(*metrics.landmarks) : Json());
   json.set("final", to_json(metrics.final_metrics));
   json.set("live", metrics.live_metrics ? to_json(*metrics.live_metrics) : Json());
   json.set("segments", segments_to_json(metrics.segments));

@@ -9,12 +9,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "tools/common/json.h"
 #include "tools/evaluate/accuracy.h"
+#include "tools/evaluate/landmark_metrics.h"
 #include "tools/evaluate/log_input.h"
 
 namespace farpoint::tools {
@@ -44,10 +46,11 @@ struct Truth {
   slam::SE3 T_body_camera0;                // identity where the truth is a text file
   bool names_body = false;                 // a lever arm is known: camera 0 is not the body
   std::vector<std::int64_t> frame_utimes;  // of CAMERA_0; empty where the truth is a text file
+  std::shared_ptr<SimulatedWorld> world;   // of a simulated recording, where asked for
 };
-// Reads truth from a recording's log or a TUM file. Throws InputError, also where there is no truth in the
-// log.
-[[nodiscard]] Truth read_truth(const std::filesystem::path& file);
+// Reads truth from a recording's log or a TUM file. `with_world`: a simulated recording's world is made
+// again, to judge landmarks by. Throws InputError, also where there is no truth in the log.
+[[nodiscard]] Truth read_truth(const std::filesystem::path& file, bool with_world = false);
 
 // A run as given on the command line.
 struct Run {
@@ -104,7 +107,9 @@ struct RunMetrics {
   std::optional<std::int64_t> deadline_misses;
   std::optional<DepthMetrics> depth;
   std::optional<std::int64_t> map_points;
-  std::optional<double> vmp_percent;  // points made through a virtual map point, of all points made
+  std::optional<double> vmp_percent;         // points made through a virtual map point, of all points made
+  std::vector<JudgedLandmark> judged;        // of the map with most frames, where the truth has a world
+  std::optional<LandmarkMetrics> landmarks;  // their figures
 };
 
 [[nodiscard]] RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options);

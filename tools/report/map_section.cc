@@ -1,0 +1,85 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tools/evaluate/statistics.h"
+#include "tools/report/html.h"
+#include "tools/report/plot.h"
+#include "tools/report/sections.h"
+
+namespace farpoint::tools::report {
+namespace {
+
+constexpr float kCertain = 0.30F;  // claimed relative sigma
+
+struct Places {
+  std::vector<Eigen::Vector2d> certain, uncertain, through_vmp;
+};
+
+Places places_of(const RunRecord& run) {
+  Places places;
+  const slam::Sim3 S = run.world_from_map();
+  const std::int32_t map_id =
+      run.run.final_trajectory.poses.empty() ? -1 : run.run.final_trajectory.poses.front().map_id;
+  for (const landmark_t& l : run.landmarks()->landmarks) {
+    if (l.map_id != map_id) continue;
+    const Eigen::Vector2d p = (S * Eigen::Vector3d(l.position[0], l.position[1], l.position[2])).head<2>();
+    if (l.relative_sigma >= kCertain)
+      places.uncertain.push_back(p);
+    else
+      (l.through_vmp != 0 ? places.through_vmp : places.certain).push_back(p);
+  }
+  return places;
+}
+
+std::vector<Eigen::Vector2d> way_of(const RunRecord& run) {
+  std::vector<Eigen::Vector2d> way;
+  for (const TimedPose& p : run.run.final_trajectory.poses)
+    way.push_back((run.world_from_map() * p.pose.t).head<2>());
+  return way;
+}
+
+// A square about the middle of the way that holds it with `margin` around.
+std::pair<Eigen::Vector2d, double> window(const std::vector<Eigen::Vector2d>& way, double margin) {
+  Eigen::Vector2d low = way.front(), high = way.front();
+  for (const Eigen::Vector2d& p : way) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return {0.5 * (low + high), 0.5 * (high - low).maxCoeff() + margin};
+}
+
+std::string picture(const RunRecord& run, const std::string& title, double margin) {
+  const std::vector<Eigen::Vector2d> way = way_of(run);
+  if (way.size() < 2) return {};
+  const auto [middle, half] = window(way, margin);
+  const std::string unit = run.length_unit();
+  Plot plot({run.name + ": " + title,
+             {"x, " + unit, false, middle.x() - half, middle.x() + half},
+             {"y, " + unit, false, middle.y() - half, middle.y() + half},
+             true,
+             520,
+             520});
+  const Places places = places_of(run);
+  plot.dots("sigma 30 % and more", places.uncertain, "#bbb", 1.6);
+  plot.dots("points", places.certain, "#333", 1.8);
+  plot.dots("points through VMPs", places.through_vmp, "#d8702a", 2.4);
+  plot.line("way", way, {"#0b3c78", "", 2.0});
+  return plot.svg();
+}
+
+}  // namespace
+
+std::string map_section(const Runs& runs) {
+  std::vector<std::string> pictures;
+  for (const RunRecord& run : runs) {
+    if (run.landmarks() == nullptr || run.landmarks()->landmarks.empty()) continue;
+    // In map units nothing tells near from far but the way's own size.
+    const bool metric = run.length_unit() == "m";
+    pictures.push_back(picture(run, "near the way", metric ? 60.0 : 5.0));
+    pictures.push_back(picture(run, "distant points too", metric ? 1200.0 : 100.0));
+  }
+  return section("Map", "Points of the map with most frames, from above, at the end of the run.",
+                 row_of(pictures));
+}
+
+}  // namespace farpoint::tools::report

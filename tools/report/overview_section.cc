@@ -1,0 +1,75 @@
+#include <algorithm>
+
+#include "tools/evaluate/statistics.h"
+#include "tools/report/html.h"
+#include "tools/report/sections.h"
+#include "tools/report/svg.h"
+
+namespace farpoint::tools::report {
+namespace {
+
+constexpr char kNone[] = "-";
+
+std::string text(const std::optional<double>& value, int digits) {
+  return value ? number(*value, digits) : kNone;
+}
+
+std::string ate(const std::optional<TrajectoryMetrics>& metrics) {
+  return metrics && metrics->absolute ? number(metrics->absolute->rmse_m, 3) : kNone;
+}
+
+std::string peak_memory(const RunRecord& run) {
+  std::int64_t peak = 0;
+  for (const timing_t& t : run.timings) peak = std::max(peak, t.peak_resident_bytes);
+  return peak > 0 ? number(static_cast<double>(peak) / 1e6, 0) : kNone;
+}
+
+std::vector<std::string> row(const RunRecord& run) {
+  const RunMetrics* m = run.metrics ? &*run.metrics : nullptr;
+  const summary_t* s = run.summary();
+  const std::vector<double> tracking_ms = run.run.log ? run.run.log->tracking_ms : std::vector<double>{};
+  const auto depth = [&](auto&& figure) { return m && m->depth ? number(figure(*m->depth), 1) : kNone; };
+  const auto rpe = [&](auto&& figure, int digits) {
+    return m && m->final_metrics.segments ? number(figure(*m->final_metrics.segments), digits) : kNone;
+  };
+  return {
+      run.name,
+      s ? s->landmark_mode : kNone,
+      s ? std::to_string(s->frames) : kNone,
+      m ? text(m->tracked_percent, 1) : kNone,
+      m ? number(100.0 * m->final_metrics.share, 1) : kNone,
+      m ? ate(m->final_metrics) : kNone,
+      m ? ate(m->live_metrics) : kNone,
+      rpe([](const SegmentError& e) { return e.translation_percent; }, 2),
+      rpe([](const SegmentError& e) { return e.rotation_deg_per_m; }, 4),
+      m && m->final_metrics.absolute ? number(m->final_metrics.absolute->scale, 4) : kNone,
+      depth([](const DepthMetrics& d) { return d.triangulation_m.p50; }),
+      depth([](const DepthMetrics& d) { return d.triangulation_m.p90; }),
+      depth([](const DepthMetrics& d) { return d.over_100_m_percent; }),
+      s && s->landmarks_made > 0
+          ? number(100.0 * static_cast<double>(s->vmp_promoted) / static_cast<double>(s->landmarks_made), 1)
+          : kNone,
+      s ? std::to_string(s->landmarks) : kNone,
+      number(percentile(tracking_ms, 50.0), 1),
+      number(percentile(tracking_ms, 99.0), 1),
+      peak_memory(run)};
+}
+
+}  // namespace
+
+std::string overview_section(const Runs& runs) {
+  std::vector<std::vector<std::string>> rows = {{"run", "mode", "frames", "tracked %", "final share %",
+                                                 "final ATE m", "live ATE m", "RPE %", "RPE deg/m", "scale",
+                                                 "depth p50 m", "depth p90 m", "> 100 m %", "VMP %", "points",
+                                                 "tracking p50 ms", "p99 ms", "peak MB"}};
+  for (const RunRecord& run : runs) rows.push_back(row(run));
+  const std::string how =
+      "final: every frame's pose after the last optimisation; live: as published when the frame came. ATE is "
+      "the RMS position error after alignment" +
+      (!runs.empty() && runs[0].metrics ? std::string(" by ") + to_string(runs[0].metrics->alignment) : "") +
+      ", RPE the relative error over 100 to 800 m. depth: of points when they were made, claimed sigma under "
+      "30 %. Tracking: CPU time of the tracking thread, image to pose.";
+  return section("Overview", how, table(rows));
+}
+
+}  // namespace farpoint::tools::report

@@ -1,0 +1,18 @@
+// A report on runs as one HTML file that needs nothing else: no network, no script.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace farpoint::tools::report {
+
+struct ReportRequest {
+  std::vector<std::filesystem::path> runs;  // output logs of farpointd
+  std::filesystem::path truth;              // the recording, or a TUM file; may be empty
+};
+
+// Throws InputError for what cannot be read.
+[[nodiscard]] std::string make_report(const ReportRequest& request);
+
+}  // namespace farpoint::tools::report

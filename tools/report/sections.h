@@ -1,0 +1,30 @@
+// The parts of a report, each as HTML; empty where the runs say nothing about it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/report/run_record.h"
+
+namespace farpoint::tools::report {
+
+using Runs = std::vector<RunRecord>;
+
+// One row a run: what evaluation says.
+[[nodiscard]] std::string overview_section(const Runs& runs);
+// Top view, height, and error over the way; `truth` may be null.
+[[nodiscard]] std::string trajectory_section(const Runs& runs, const Truth* truth);
+[[nodiscard]] std::string timing_section(const Runs& runs);
+// Distances at which points were made and seen; against a simulated world, how right they are.
+[[nodiscard]] std::string landmark_section(const Runs& runs);
+// How long virtual map points lived before they became points, and when.
+[[nodiscard]] std::string vmp_section(const Runs& runs);
+[[nodiscard]] std::string map_section(const Runs& runs);
+// Tracks drawn over frames of the recording, which has the images; empty without one.
+[[nodiscard]] std::string track_section(const Runs& runs, const std::filesystem::path& recording);
+// States and faults on a time line; queues and memory over time.
+[[nodiscard]] std::string health_section(const Runs& runs);
+[[nodiscard]] std::string configuration_section(const Runs& runs);
+
+}  // namespace farpoint::tools::report

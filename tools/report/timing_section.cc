@@ -1,0 +1,157 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "tools/evaluate/statistics.h"
+#include "tools/report/histogram.h"
+#include "tools/report/html.h"
+#include "tools/report/plot.h"
+#include "tools/report/sections.h"
+
+namespace farpoint::tools::report {
+namespace {
+
+struct Stage {
+  int index;
+  const char* name;
+};
+constexpr std::array kStages = {
+    Stage{timing_t::STAGE_DECODE, "decode"},        Stage{timing_t::STAGE_TRACKING, "tracking, all"},
+    Stage{timing_t::STAGE_PYRAMID, "  pyramid"},    Stage{timing_t::STAGE_EXTRACTION, "  extraction"},
+    Stage{timing_t::STAGE_MATCHING, "  matching"},  Stage{timing_t::STAGE_ALIGNMENT, "  alignment"},
+    Stage{timing_t::STAGE_POSE, "  pose"},          Stage{timing_t::STAGE_KEYFRAME, "  keyframe"},
+    Stage{timing_t::STAGE_MAPPING, "mapping, all"}, Stage{timing_t::STAGE_TRIANGULATION, "  triangulation"},
+    Stage{timing_t::STAGE_FUSING, "  fusing"},      Stage{timing_t::STAGE_LOCAL_BA, "  local BA"},
+    Stage{timing_t::STAGE_CULLING, "  culling"},    Stage{timing_t::STAGE_OUTPUT, "output"}};
+
+std::vector<double> times_ms(const RunRecord& run, int stage) {
+  std::vector<double> values;
+  for (const timing_t& t : run.timings) {
+    if (t.cpu_ms[stage] >= 0.0) values.push_back(t.cpu_ms[stage]);
+  }
+  return values;
+}
+
+double deadline_ms(const Runs& runs) {
+  for (const RunRecord& run : runs) {
+    for (const timing_t& t : run.timings) {
+      if (t.deadline_ms > 0.0) return t.deadline_ms;
+    }
+  }
+  return 0.0;
+}
+
+std::string tracking_histogram(const Runs& runs) {
+  double high = 0.0;
+  for (const RunRecord& run : runs) {
+    const std::vector<double> ms = times_ms(run, timing_t::STAGE_TRACKING);
+    if (!ms.empty()) high = std::max(high, percentile(ms, 99.8));
+  }
+  if (high <= 0.0) return {};
+  const double deadline = deadline_ms(runs);
+  const std::vector<double> bins = edges(0.0, 1.05 * high, 60);
+  Plot plot({"Tracking, CPU time a frame", {"CPU time, ms"}, {"frames, %"}, false, 520, 320});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::vector<double> ms = times_ms(runs[i], timing_t::STAGE_TRACKING);
+    if (!ms.empty()) plot.steps(runs[i].name, bins, shares_percent(ms, bins), run_style(i));
+  }
+  if (deadline > 0.0 && deadline < 4.0 * high)
+    plot.mark_x("deadline, " + number(deadline, 0) + " ms", deadline, {"#000", "3 3", 1.5});
+  return plot.svg();
+}
+
+// Times in their own order: CPU time of tracking frame by frame.
+std::string tracking_over_time(const Runs& runs) {
+  Plot plot({"Tracking over time", {"time since the first frame, s"}, {"CPU time, ms"}, false, 520, 320});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    std::vector<Eigen::Vector2d> points;
+    for (const timing_t& t : runs[i].timings) {
+      const double ms = t.cpu_ms[timing_t::STAGE_TRACKING];
+      if (ms >= 0.0) points.emplace_back(seconds_of(t.utime) - runs[i].start_s, ms);
+    }
+    Style style = run_style(i);
+    style.width_px = 1.0;
+    if (!points.empty()) plot.line(runs[i].name, points, style);
+  }
+  return plot.svg();
+}
+
+// Bars from 0 to the median, a whisker to the 99th percentile; one group a stage, one bar a run.
+std::string stage_bars(const Runs& runs) {
+  constexpr double kLeft_px = 120, kWidth_px = 1080, kBar_px = 8, kGap_px = 8, kTop_px = 30;
+  double high = 0.0;
+  std::size_t stages = 0;
+  for (const Stage& stage : kStages) {
+    bool ran = false;
+    for (const RunRecord& run : runs) {
+      const std::vector<double> ms = times_ms(run, stage.index);
+      if (ms.empty()) continue;
+      high = std::max(high, percentile(ms, 99.0));
+      ran = true;
+    }
+    stages += ran ? 1U : 0U;
+  }
+  if (stages == 0) return {};
+  const double deadline = deadline_ms(runs);
+  // The deadline belongs into the picture as long as it does not flatten the bars.
+  if (deadline > 0.0 && deadline < 2.0 * high) high = std::max(high, deadline);
+  high *= 1.04;
+  const double group = kBar_px * static_cast<double>(runs.size()) + kGap_px;
+  const double bottom = kTop_px + group * static_cast<double>(stages);
+  const auto at = [&](double ms) { return kLeft_px + (kWidth_px - kLeft_px - 20.0) * std::sqrt(ms / high); };
+  Svg svg(kWidth_px, bottom + 46.0 + 17.0 * std::ceil(static_cast<double>(runs.size()) / 4.0));
+  svg.text({kLeft_px, 18}, "Stages: bar to the median, line to the 99th percentile (square-root axis)",
+           Anchor::kStart, "class=\"title\"");
+  for (const double ms : {0.0, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
+    if (ms > high) break;
+    svg.line({at(ms), kTop_px}, {at(ms), bottom}, "class=\"grid\"");
+    svg.text({at(ms), bottom + 15}, number(ms, 1), Anchor::kMiddle);
+  }
+  svg.text({0.5 * (kLeft_px + kWidth_px), bottom + 32}, "CPU time, ms", Anchor::kMiddle);
+  double y = kTop_px;
+  for (const Stage& stage : kStages) {
+    bool ran = false;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      const std::vector<double> ms = times_ms(runs[i], stage.index);
+      if (ms.empty()) continue;
+      ran = true;
+      const double middle = y + 0.5 * kGap_px + (static_cast<double>(i) + 0.5) * kBar_px;
+      const Style style = run_style(i);
+      svg.rectangle({kLeft_px, middle - 0.5 * kBar_px + 1.0},
+                    {std::max(at(percentile(ms, 50.0)) - kLeft_px, 0.8), kBar_px - 2.0},
+                    "fill=\"" + style.colour + "\" fill-opacity=\"" + (i % 2 == 0 ? "0.95" : "0.55") + "\"");
+      svg.line({at(percentile(ms, 50.0)), middle}, {at(percentile(ms, 99.0)), middle},
+               stroke({style.colour, style.dash, 1.4}));
+    }
+    if (!ran) continue;
+    svg.text({stage.name[0] == ' ' ? 22.0 : 6.0, y + 0.5 * group + 4.0}, stage.name, Anchor::kStart);
+    y += group;
+  }
+  if (deadline > 0.0 && deadline <= high) {
+    svg.line({at(deadline), kTop_px}, {at(deadline), bottom}, stroke({"#000", "3 3", 1.5}));
+    svg.text({at(deadline) - 4, kTop_px + 10}, "deadline", Anchor::kEnd);
+  }
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Eigen::Vector2d corner(kLeft_px + 230.0 * static_cast<double>(i % 4),
+                                 bottom + 42.0 + 17.0 * static_cast<double>(i / 4));
+    svg.rectangle(
+        corner, {22, 8},
+        "fill=\"" + run_style(i).colour + "\" fill-opacity=\"" + (i % 2 == 0 ? "0.95" : "0.55") + "\"");
+    svg.text(corner + Eigen::Vector2d(28, 8), runs[i].name, Anchor::kStart);
+  }
+  return svg.finish("CPU time of each stage");
+}
+
+}  // namespace
+
+std::string timing_section(const Runs& runs) {
+  const std::string histogram = tracking_histogram(runs), bars = stage_bars(runs);
+  if (histogram.empty() && bars.empty()) return {};
+  return section(
+      "Timing",
+      "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed "
+      "to the output; mapping works beside it in a threaded run.",
+      row_of({histogram, tracking_over_time(runs), bars}));
+}
+
+}  // namespace farpoint::tools::report

@@ -1,0 +1,32 @@
+// A simulation as an LCM log: CALIBRATION and SIMULATION first, then IMU, WHEELS, GROUND_TRUTH and CAMERA_N
+// in the order of their times.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "tools/simulate/simulation.h"
+
+namespace farpoint::tools::simulate {
+
+enum class ImageFormat { kGrey, kMjpeg };
+
+struct RecorderOptions {
+  std::string output;  // a file, "-" or a device
+  ImageFormat format = ImageFormat::kGrey;
+  // Also writes every n-th image of camera 0 as a PNG file into a folder; 0: none.
+  std::filesystem::path picture_folder;
+  std::int64_t picture_every = 0;
+};
+
+struct RecorderResult {
+  std::int64_t frames = 0;
+  double path_m = 0.0, simulated_s = 0.0, cpu_s = 0.0;
+};
+
+// Throws InputError where the output cannot be opened, RunError where it could not be written to its end or a
+// signal stopped it; what was written so far is then kept as <output>.incomplete, and replays.
+RecorderResult record(Simulation* simulation, const RecorderOptions& options);
+
+}  // namespace farpoint::tools::simulate
