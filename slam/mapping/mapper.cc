@@ -31,7 +31,7 @@ double inverse_distance_from(const Eigen::Vector3d& place_w, const Eigen::Vector
 // All measurements of a landmark are of its one host patch, and share what is wrong with it: noise in its
 // pixels, a surface that is not as flat as it was taken for. That part, so large (1 sigma), does not average
 // out.
-constexpr double kPatchSigma_px = 0.1;
+constexpr double kPatchSigma_px = 0.2;
 
 // n measurements of independent errors sigma and one common error s know their mean to sigma^2 / n + s^2: as
 // much as n with this weight would, were they independent.

@@ -22,7 +22,8 @@ struct SceneOptions {
   double rehosted_share =
       0.1;                // anchor somewhere near the host, not its camera; the host's sighting is measured
   double noise_px = 0.5;  // of every measurement; its sigma_px
-  double outlier_share = 0.0;                                       // measurements that are 5 to 40 px off
+  double least_weight = 1.0;   // of a point; the others lie between this and 1
+  double outlier_share = 0.0;  // measurements that are 5 to 40 px off
   double start_m = 0.05, start_rad = 0.005, start_log_depth = 0.1;  // 1 sigma of the start's error
   std::uint64_t seed = 1;
 };
@@ -96,6 +97,7 @@ class BundleScene {
         continue;
       const bool infinite = uniform(0.0, 1.0) < options_.infinite_share;
       point.inverse_depth = infinite ? 0.0 : 1.0 / (3.0 * std::pow(options_.far_m / 3.0, uniform(0.0, 1.0)));
+      if (options_.least_weight < 1.0) point.weight = uniform(options_.least_weight, 1.0);
       if (add_measurements(&point, rehosted)) return;
     }
   }

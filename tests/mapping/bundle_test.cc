@@ -362,6 +362,11 @@ SceneOptions near_scene(std::uint64_t seed, int fixed, double outliers, int came
   o.infinite_share = 0.0, o.far_m = 60.0;
   return o;
 }
+SceneOptions weighted_scene(std::uint64_t seed) {
+  SceneOptions o = near_scene(seed, 2, 0.05, 1);
+  o.least_weight = 0.05;
+  return o;
+}
 SceneOptions far_scene(std::uint64_t seed) {
   SceneOptions o = scene_options(seed, 8, 0.05, 1);
   o.infinite_share = 0.6;
@@ -382,7 +387,7 @@ double distance_from_optimum(const BundleProblem& p) {
       BundleLinearisation lin;
       if (!linearise(p, point, m, &lin)) continue;
       const double r = lin.residual.norm();
-      const double w = r <= kHuberDelta ? 1.0 : kHuberDelta / r;
+      const double w = point.weight * (r <= kHuberDelta ? 1.0 : kHuberDelta / r);
       const auto add = [&](int pose, const Eigen::Matrix<double, 2, 6>& J) {
         pose_gradient[static_cast<std::size_t>(pose)] += w * J.transpose() * lin.residual;
         pose_curvature[static_cast<std::size_t>(pose)] += w * J.colwise().squaredNorm().transpose();
@@ -416,6 +421,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, BundleComparison,
                          testing::Values(Comparison{"near_clean", near_scene(1, 2, 0.0, 1), false},
                                          Comparison{"near_outliers", near_scene(2, 3, 0.1, 1), false},
                                          Comparison{"near_two_cameras", near_scene(3, 2, 0.05, 2), false},
+                                         Comparison{"near_weighted", weighted_scene(6), false},
                                          Comparison{"all_depths", scene_options(4, 2, 0.05, 1), true},
                                          Comparison{"mostly_infinite", far_scene(5), true}),
                          [](const auto& info) { return info.param.name; });
