@@ -134,7 +134,7 @@ TEST_F(ReportOfARun, ShowsEverySectionAndNeedsNothingElse) {
   expect_well_formed(html);
   for (const char* title :
        {"Overview", "Trajectory", "Landmarks", "Virtual map points", "Map", "Feature tracks", "Timing",
-        "States, faults, queues, memory", "Configuration and build"})
+        "Work", "States, faults, queues, memory", "Configuration and build"})
     EXPECT_NE(html.find(std::string("<h2>") + title), std::string::npos) << title;
   // No network, no script, no number that is none.
   std::string no_namespace = html;

@@ -21,7 +21,7 @@ std::string make_report(const ReportRequest& request) {
                      "</p>\n";
   body += overview_section(runs) + trajectory_section(runs, known) + landmark_section(runs) +
           vmp_section(runs) + map_section(runs) + track_section(runs, request.truth) + timing_section(runs) +
-          health_section(runs) + configuration_section(runs);
+          workload_section(runs) + health_section(runs) + configuration_section(runs);
   return page("Farpoint: " + names, body);
 }
 

@@ -16,6 +16,8 @@ using Runs = std::vector<RunRecord>;
 // Top view, height, and error over the way; `truth` may be null.
 [[nodiscard]] std::string trajectory_section(const Runs& runs, const Truth* truth);
 [[nodiscard]] std::string timing_section(const Runs& runs);
+// Features, matches, track lengths and times side by side, with ratios to the first run.
+[[nodiscard]] std::string workload_section(const Runs& runs);
 // Distances at which points were made and seen; against a simulated world, how right they are.
 [[nodiscard]] std::string landmark_section(const Runs& runs);
 // How long virtual map points lived before they became points, and when.
