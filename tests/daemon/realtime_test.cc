@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
-#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
@@ -23,8 +23,13 @@ TEST(Realtime, AThreadRunsWhereItIsBoundAndItIsSaid) {
   wanted.core = core;
   RealtimeReport report(config);
   std::atomic<int> ran_on{-1};
+  std::atomic<bool> may_end{false};
   {
-    Thread thread("fp-test", config, wanted, &report, [&] { ran_on = sched_getcpu(); });
+    Thread thread("fp-test", config, wanted, &report, [&] {
+      ran_on = sched_getcpu();
+      while (!may_end) usleep(1000);
+    });
+    may_end = true;
   }
   EXPECT_EQ(ran_on, core);
   ASSERT_EQ(report.granted().size(), 1U);
@@ -56,8 +61,13 @@ TEST(Realtime, APriorityIsGrantedOrRefusedAndSaid) {
   wanted.priority = 5;
   RealtimeReport report(config);
   std::atomic<int> policy{-1};
+  std::atomic<bool> may_end{false};  // one that has ended has no priority to tell
   {
-    Thread thread("fp-test", config, wanted, &report, [&] { policy = sched_getscheduler(0); });
+    Thread thread("fp-test", config, wanted, &report, [&] {
+      policy = sched_getscheduler(0);
+      while (!may_end) usleep(1000);
+    });
+    may_end = true;
   }
   ASSERT_EQ(report.granted().size(), 1U);
   if (policy == SCHED_FIFO) {

@@ -27,7 +27,7 @@ def run(*command, **kwargs):
 
 
 def check_install(build, cmake, folder):
-    done = run(cmake, "--install", build, env={**os.environ, "DESTDIR": folder})
+    done = run(cmake, "--install", build, "--prefix", "/usr", env={**os.environ, "DESTDIR": folder})
     if done.returncode != 0:
         yield "cmake --install: " + done.stderr.strip()
     present = {path.relative_to(folder).as_posix() for path in pathlib.Path(folder).rglob("*") if path.is_file()}
