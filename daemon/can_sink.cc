@@ -2,6 +2,9 @@
 
 #include <cmath>
 
+#include "daemon/extrapolation.h"
+#include "daemon/stage_clock.h"
+
 namespace farpoint::daemon {
 namespace {
 
@@ -70,12 +73,49 @@ void CanSink::on_frame(const FrameOutput& frame) {
   const double age_s = 1e-6 * static_cast<double>(frame.age_us);
   const ipc::CanEpoch frames = encoder_.encode(make_epoch(frame, pose_frame_, age_s));
   if (bus_) bus_->send(frames);
+  if (steady_period_s_ > 0.0) {
+    last_ = frame;
+    last_s_ = steady_s();
+    next_steady_s_ = last_s_ + steady_period_s_;
+  }
   if (!log_) return;
   if (frame.result.utime >= 0) {
     log_->write(frame.result.utime, frames);
   } else {
     ++not_logged_;
   }
+}
+
+void CanSink::send_steadily(double rate_hz, double frame_period_s) {
+  steady_period_s_ = rate_hz > 0.0 ? 1.0 / rate_hz : 0.0;
+  frame_period_s_ = frame_period_s;
+}
+
+bool CanSink::tick(double now_s, wheels_t* wheels) {
+  constexpr double kMaintainEvery_s = 1.0;
+  if (!bus_) return false;
+  if (now_s >= next_maintenance_s_) {
+    next_maintenance_s_ = now_s + kMaintainEvery_s;
+    bus_->maintain();
+  }
+  if (last_s_ > 0.0 && steady_period_s_ > 0.0 && now_s >= next_steady_s_) send_carried_on(now_s);
+  ipc::CanFrame frame;
+  while (bus_->receive(&frame)) {
+    const auto utime = static_cast<std::int64_t>(std::llround(1e6 * now_s));
+    if (wheels_ && wheels_->take(frame, utime, wheels)) return true;
+  }
+  return false;
+}
+
+void CanSink::send_carried_on(double now_s) {
+  // Longer than this nobody knows where the body went: its age alone goes on.
+  constexpr double kLongest_s = 0.25;
+  // From tick to tick, and not late for ever where one came late.
+  next_steady_s_ = std::max(next_steady_s_ + steady_period_s_, now_s);
+  const double dt_s = now_s - last_s_;
+  FrameOutput frame = extrapolate(last_, dt_s, frame_period_s_);
+  if (dt_s > kLongest_s) frame.valid = false;
+  bus_->send(encoder_.encode(make_epoch(frame, pose_frame_, 1e-6 * static_cast<double>(frame.age_us))));
 }
 
 std::int64_t CanSink::errors() const {

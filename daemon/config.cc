@@ -255,6 +255,14 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   };
   require_not_above("extractor.fast_threshold_min", "extractor.fast_threshold");
   require_not_above("tracking.min_inliers", "tracking.degraded_inliers");
+  if (config.camera.rate_hz > 0.0 && config.camera.lost_after_s < 1.5 / config.camera.rate_hz) {
+    const auto set_at = origins.find("camera.lost_after_s");
+    fail(set_at == origins.end() ? "built-in defaults" : set_at->second,
+         "camera.lost_after_s: " + value_text(config, "camera.lost_after_s") +
+             ", expected at least one and a half frame periods of camera.rate_hz (" +
+             value_text(config, "camera.rate_hz") + ")");
+  }
+  require_not_above("camera.exposure_short_us", "camera.exposure_max_us");
   require_not_above("mapping.quick_view_delay_frames", "mapping.full_view_delay_frames");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");

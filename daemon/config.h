@@ -20,10 +20,41 @@ namespace farpoint::daemon {
 
 struct LogConfig {
   std::string level = "info";
+  // Live.
+  std::string file = "none";
+  int file_mb = 10, files = 5;
+};
+
+struct ControlConfig {
+  std::string socket = "/run/farpoint/control";
+};
+
+enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kMjpeg };
+enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
+enum class ExposureChoice { kCamera, kAuto, kManual };
+
+struct ExposureConfig {
+  ExposureChoice mode = ExposureChoice::kAuto;
+  double manual_us = 5000;
+  int manual_gain = 0;
+  double short_us = 4000, max_us = 15000;
+  double max_gain_share = 0.75;
+  double target_grey = 110;
 };
 
 struct CameraConfig {
   int index = 0;  // which camera of the log, and of its calibration, is tracked
+  // Live.
+  std::string device = "/dev/video0";
+  std::string calibration = "/etc/farpoint/camera.yaml";
+  CameraFormatChoice format = CameraFormatChoice::kAuto;
+  double rate_hz = 30;
+  int buffers = 4;
+  StampPointChoice stamp = StampPointChoice::kAuto;
+  int time_offset_us = 0;
+  double stall_s = 1.0;        // silent for so long: started anew
+  double lost_after_s = 0.25;  // silent for so long: 'no_camera'
+  ExposureConfig exposure;
 };
 
 struct ScaleConfig {
@@ -31,6 +62,7 @@ struct ScaleConfig {
 };
 
 struct LcmConfig {
+  bool enabled = true;  // live
   std::string url = ipc::kDefaultLcmUrl;
   double status_rate_hz = 5.0;
   double map_rate_hz = 1.0;
@@ -40,21 +72,34 @@ struct LcmConfig {
 enum class CanPoseFrame { kMap, kOdom };
 
 struct CanConfig {
+  bool enabled = false;  // live
   std::string interface = "can0";
   CanPoseFrame frame = CanPoseFrame::kMap;
+  double rate_hz = 0;  // live; 0: with each image only
+  std::string wheels_dbc = "none", wheel_signals = "none";
+};
+
+enum class SchedulingPolicy { kFifo, kRoundRobin };
+
+struct ThreadConfig {
+  int priority = 0;  // 0: ordinary scheduling
+  int core = -1;     // -1: any
 };
 
 // Threaded runs.
 struct RealtimeConfig {
   bool lock_memory = true;
-  int stack_kb = 512;         // of each thread
-  int capture_queue = 2;      // images that may wait for tracking
-  int tracking_priority = 0;  // SCHED_FIFO; 0: ordinary
-  bool require = false;       // leave where the system refuses
+  int stack_kb = 512;     // of each thread
+  int capture_queue = 2;  // images that may wait for tracking
+  SchedulingPolicy policy = SchedulingPolicy::kFifo;
+  ThreadConfig capture, tracking, output, mapping;
+  int cpu_latency_us = -1;  // live; -1: as the system likes
+  bool require = false;     // leave where the system refuses
 };
 
 struct Config {
   LogConfig log;
+  ControlConfig control;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;

@@ -9,11 +9,14 @@ struct InputCounts {
   std::int64_t images = 0;  // of all cameras
   std::int64_t wrong_size = 0, undecodable = 0, unknown_camera = 0, times_backwards = 0;
   std::int64_t messages_undecodable = 0, log_damages = 0;
+  // Live cameras: gaps in the driver's numbers, buffers it called damaged, times it went away or fell silent.
+  std::int64_t missing = 0, flagged = 0, camera_losses = 0;
 };
 
 // What could not be sent; the bus is counted here because its sink is no message sink.
 struct OutputCounts {
-  std::int64_t can_send_errors = 0;
+  std::int64_t can_send_errors = 0, can_bus_offs = 0, can_received = 0;
+  std::int8_t can_state = 0;  // drivers::CanState
 };
 
 }  // namespace farpoint::daemon

@@ -29,7 +29,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   const slam::FrameResult& result = package->result;
   {
     const StageScope scope(&package->clock, timing_t::STAGE_OUTPUT);
-    frame_ = make_frame_output(result, assumed_scale_);
+    frame_ = make_frame_output(since_odom_reset(result), assumed_scale_);
     frame_.age_us = package->chance.age_us;
     ++status_.frames_tracked;
     if (frame_.valid) ++status_.frames_valid;
@@ -40,6 +40,9 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     if (with_schedule_) publish_schedule(*package);
   }
   note_state(frame_.result);
+  silence_.result = since_odom_reset(result);
+  silence_.counts = package->counts;
+  silence_.chance = package->chance;
   if (publisher_->has_sinks()) {
     publisher_->publish(ipc::kTimingChannel, result.utime,
                         package->clock.message(result.utime, result.sequence, package->chance.age_us));
@@ -47,10 +50,47 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   return frame_;
 }
 
+slam::FrameResult FrameReporter::since_odom_reset(const slam::FrameResult& result) {
+  if (result.has_pose && reset_odom_.exchange(false, std::memory_order_relaxed)) {
+    T_odom_start_ = result.T_odom_body;
+    ++odom_resets_;
+  }
+  if (odom_resets_ == 0) return result;
+  slam::FrameResult r = result;
+  r.T_odom_body = T_odom_start_.inverse() * result.T_odom_body;
+  // What the map frame says stays as it is: map_from_odom takes up the difference.
+  const slam::Sim3& S = result.map_from_odom;
+  r.map_from_odom = {S.scale, (S.q * T_odom_start_.q).normalized(), S * T_odom_start_.t};
+  r.reset_counter += odom_resets_;
+  return r;
+}
+
+const FrameOutput& FrameReporter::report_silence(std::int64_t utime, std::int64_t age_us,
+                                                 const InputCounts& in, const OutputCounts& out) {
+  slam::FrameResult& r = silence_.result;
+  r.utime = utime;
+  r.state = slam::State::kNoCamera;
+  r.has_pose = false;
+  r.quality = -1;
+  r.features = r.matches = r.inliers = r.aligned = 0;
+  r.keyframe = false;
+  silence_.in = in;
+  frame_ = make_frame_output(r, assumed_scale_);
+  frame_.age_us = age_us;
+  for (PoseSink* sink : sinks_) sink->on_frame(frame_);
+  // Its time is that of the news, not of a measurement.
+  frame_.age_us = 0;
+  publisher_->on_frame(frame_);
+  publish_status(silence_, out);
+  note_state(frame_.result);
+  return frame_;
+}
+
 void FrameReporter::publish_status(const FramePackage& package, const OutputCounts& out) {
   fill_status(package, out);
   const bool changed = frame_.result.state != last_state_;
-  const bool on_time = due(frame_.result.utime, status_rate_hz_, &next_status_utime_);
+  const double rate_hz = status_rate_hz_.load(std::memory_order_relaxed);
+  const bool on_time = due(frame_.result.utime, rate_hz, &next_status_utime_);
   if (changed || on_time) publisher_->publish(ipc::kStatusChannel, frame_.result.utime, status_);
 }
 
@@ -86,11 +126,17 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.keyframes_dropped = static_cast<std::int64_t>(counts.keyframes_dropped);
   s.images_wrong_size = in.wrong_size;
   s.images_undecodable = in.undecodable;
+  s.images_missing = in.missing;
+  s.images_flagged = in.flagged;
+  s.camera_losses = in.camera_losses;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
   s.messages_undecodable = in.messages_undecodable;
   s.log_damages = in.log_damages;
   s.can_send_errors = out.can_send_errors;
+  s.can_bus_offs = out.can_bus_offs;
+  s.can_received = out.can_received;
+  s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors());
   s.maps = static_cast<std::int32_t>(counts.maps);

@@ -1,6 +1,7 @@
 // Everything that is published of a frame, in one order, on one thread; no heap call after the first frames.
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -25,21 +26,34 @@ class FrameReporter {
 
   // Hands the frame to every sink. `package->clock` gets the time of the output.
   const FrameOutput& report(FramePackage* package, const OutputCounts& out);
+  // The camera is away: tells every sink that there is no pose now, and why. age_us: since the last frame.
+  const FrameOutput& report_silence(std::int64_t utime, std::int64_t age_us, const InputCounts& in,
+                                    const OutputCounts& out);
+  // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.
+  void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
+  // Any thread.
+  void set_status_rate(double rate_hz) { status_rate_hz_.store(rate_hz, std::memory_order_relaxed); }
 
  private:
   void publish_status(const FramePackage& package, const OutputCounts& out);
   void publish_schedule(const FramePackage& package);
+  [[nodiscard]] slam::FrameResult since_odom_reset(const slam::FrameResult& result);
   void fill_status(const FramePackage& package, const OutputCounts& out);
   void note_state(const slam::FrameResult& result);
 
-  const double status_rate_hz_, assumed_scale_;
+  std::atomic<double> status_rate_hz_;
+  const double assumed_scale_;
   const bool with_schedule_;
   std::vector<PoseSink*> sinks_;
   Publisher* publisher_;
   MapBoard* maps_;
 
   FrameOutput frame_;
-  status_t status_{};  // its texts are set once
+  std::atomic<bool> reset_odom_{false};
+  slam::SE3 T_odom_start_;  // of the last reset
+  std::uint32_t odom_resets_ = 0;
+  FramePackage silence_;  // what the last frame said, without its pose
+  status_t status_{};     // its texts are set once
   slam::State last_state_ = slam::State::kStarting;
   std::int64_t next_status_utime_;
 };

@@ -17,6 +17,8 @@ struct CapturedImage {
   ipc::GreyImage image;
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
+  std::int32_t exposure_us = -1;    // -1 unknown
+  float gain = -1.0F;               // -1 unknown
   InputCounts in;                   // when it was read
   std::int64_t frames_dropped = 0;  // when it was queued
   double due_s = 0;                 // steady clock

@@ -8,6 +8,7 @@ namespace farpoint::daemon {
 
 // Level is the key log.level: debug | info | warning | error.
 void start_logging(const std::string& level);
+void set_log_level(const std::string& level);
 
 // A bar on standard error where that is a terminal; silent elsewhere.
 class Progress {

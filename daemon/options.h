@@ -11,12 +11,13 @@ namespace farpoint::daemon {
 // What the daemon was asked to do. Empty paths mean "not wanted".
 struct Options {
   std::optional<std::string> config_path;
-  std::string replay;  // "-" is standard input
+  std::string replay;  // "-" is standard input; empty: live
   // Threads, at so many times the recorded pace; else one thread.
   std::optional<double> speed;
   // Repeat a threaded run: its schedule is in this log. Empty: no.
   std::string schedule_log;
   std::string output, trajectory, live_trajectory, can_log;
+  std::string record;  // live: what the camera gave
   // Engaged but empty: wanted, with lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;
   std::vector<std::string> settings;  // "dotted.key=value", in order

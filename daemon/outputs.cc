@@ -4,7 +4,7 @@
 
 namespace farpoint::daemon {
 
-Outputs::Outputs(const Options& options, const Config& config) : options_(options) {
+Outputs::Outputs(const Options& options, const Config& config, Use use) : options_(options), use_(use) {
   try {
     open_files(config);
   } catch (const std::runtime_error& error) {
@@ -19,6 +19,21 @@ std::vector<PoseSink*> Outputs::sinks() {
   if (can_) all.push_back(can_.get());
   if (live_) all.push_back(live_.get());
   return all;
+}
+
+OutputCounts Outputs::counts() const {
+  OutputCounts counts;
+  if (!can_) return counts;
+  counts.can_send_errors = can_->errors();
+  counts.can_bus_offs = static_cast<std::int64_t>(can_->bus_counts().bus_off);
+  counts.can_received = static_cast<std::int64_t>(can_->bus_counts().received);
+  counts.can_state = static_cast<std::int8_t>(can_->bus_state());
+  return counts;
+}
+
+void Outputs::tick(double now_s) {
+  if (!can_) return;
+  while (can_->tick(now_s, &wheels_)) publisher_.publish(ipc::kWheelsChannel, wheels_.utime, wheels_);
 }
 
 std::vector<std::string> Outputs::close(const RunEnd& end) {
@@ -59,23 +74,46 @@ void Outputs::open_files(const Config& config) {
 }
 
 void Outputs::open_network(const Config& config) {
-  if (!options_.lcm_url) return;
-  const std::string url = options_.lcm_url->empty() ? config.lcm.url : *options_.lcm_url;
+  const bool live = use_ == Use::kLive;
+  if (!options_.lcm_url && !(live && config.lcm.enabled)) return;
+  const std::string url = options_.lcm_url.value_or("").empty() ? config.lcm.url : *options_.lcm_url;
   try {
     publisher_.add(std::make_unique<LcmMessageSink>(url));
   } catch (const std::runtime_error& error) {
+    if (live) throw;
     spdlog::warn("{}; replay goes on without the network", error.what());
   }
 }
 
 void Outputs::open_bus(const Config& config) {
-  if (!options_.can_interface) return;
+  if (!options_.can_interface && !(use_ == Use::kLive && config.can.enabled)) return;
   try {
-    auto bus = std::make_unique<drivers::SocketCan>(bus_name(config));
+    const drivers::CanOptions options = read_wheels(config);
+    auto bus = std::make_unique<drivers::SocketCan>(bus_name(config), options);
     make_can(config)->send_on(std::move(bus));
+    if (use_ == Use::kLive)
+      can_->send_steadily(config.can.rate_hz,
+                          config.camera.rate_hz > 0.0 ? 1.0 / config.camera.rate_hz : 0.0);
+  } catch (const ConfigError&) {
+    throw;
   } catch (const std::runtime_error& error) {
-    spdlog::warn("{}; replay goes on without the bus", error.what());
+    spdlog::warn("{}; the run goes on without the bus", error.what());
   }
+}
+
+drivers::CanOptions Outputs::read_wheels(const Config& config) {
+  drivers::CanOptions options;
+  options.wait_for_interface = use_ == Use::kLive;
+  if (use_ != Use::kLive || config.can.wheels_dbc == "none" || config.can.wheel_signals == "none")
+    return options;
+  try {
+    auto wheels = std::make_unique<drivers::WheelReader>(config.can.wheels_dbc, config.can.wheel_signals);
+    options.wanted_ids = wheels->ids();
+    make_can(config)->read_wheels(std::move(wheels));
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(std::string("configuration: can: ") + error.what());
+  }
+  return options;
 }
 
 CanSink* Outputs::make_can(const Config& config) {

@@ -10,11 +10,12 @@
 #include "daemon/log_frame_source.h"
 #include "daemon/logging.h"
 #include "daemon/outputs.h"
+#include "daemon/paced_source.h"
+#include "daemon/pipeline.h"
 #include "daemon/rig.h"
 #include "daemon/schedule.h"
 #include "daemon/session.h"
 #include "daemon/stop_signal.h"
-#include "daemon/threaded_replay.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -100,9 +101,19 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   SourceFrame first;
   if (!source.next(&first, &clock)) throw InputError(source.name() + ": no image");
   const std::unique_ptr<Session> session = make_session(config, source, &outputs, "threaded", true);
-  ThreadedReplay replay(config, *options.speed, &source, session.get(), &outputs);
-  replay.run(first, hooks);
-  return conclude(options, source, replay.frames_dropped(), replay.take_tracking_cpu_ms(), session.get(),
+  PacedSource paced(&source, first, *options.speed);
+  RealtimeReport realtime(config.realtime);
+  realtime.lock_memory();
+  PipelineOptions pipeline_options;
+  pipeline_options.width_px = first.image->width_px;
+  pipeline_options.height_px = first.image->height_px;
+  pipeline_options.realtime = &realtime;
+  Pipeline pipeline(config, pipeline_options, &paced, session.get(), &outputs);
+  ThreadHooks all_hooks = hooks;
+  all_hooks.on_started = [&] { realtime.print(); };
+  pipeline.run(all_hooks);
+  StopOnSignal::check();
+  return conclude(options, source, pipeline.frames_dropped(), pipeline.take_tracking_cpu_ms(), session.get(),
                   &outputs);
 }
 

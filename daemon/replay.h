@@ -3,7 +3,7 @@
 
 #include "daemon/config.h"
 #include "daemon/options.h"
-#include "daemon/threaded_replay.h"
+#include "daemon/pipeline.h"
 
 namespace farpoint::daemon {
 

@@ -1,19 +1,13 @@
 // From the log's calibration message to the estimator's rig.
 #pragma once
 
-#include <stdexcept>
 #include <string>
 
+#include "daemon/errors.h"
 #include "ipc/message.h"
 #include "slam/config.h"
 
 namespace farpoint::daemon {
-
-// The input cannot be used: what() is one line with what, where and what was expected. Exit status 2.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 // The tracked camera's place on the body and its model. Throws InputError where the calibration does not
 // describe that camera completely (unknown model, numbers that make no camera, orientation that is no

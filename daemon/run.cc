@@ -6,10 +6,12 @@
 #include <filesystem>
 
 #include "daemon/config.h"
+#include "daemon/live.h"
 #include "daemon/logging.h"
 #include "daemon/options.h"
 #include "daemon/replay.h"
 #include "daemon/rig.h"
+#include "daemon/service_log.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -37,6 +39,14 @@ void make_libraries_single_threaded() {
   }
 }
 
+// However the run ends, what it logged is written.
+struct ServiceLogEnd {
+  ServiceLogEnd() = default;
+  ~ServiceLogEnd() { stop_service_log(); }
+  ServiceLogEnd(const ServiceLogEnd&) = delete;
+  ServiceLogEnd& operator=(const ServiceLogEnd&) = delete;
+};
+
 int fail(const char* what, int status) {
   std::fprintf(stderr, "farpointd: %s\n", what);
   return status;
@@ -51,6 +61,11 @@ int run_checked(int argc, const char* const* argv) {
   const Config config = load_configuration(line.options);
   start_logging(config.log.level);
   make_libraries_single_threaded();
+  if (line.options.replay.empty()) {
+    start_service_log(config.log);
+    const ServiceLogEnd end;
+    return live(line.options, config, [&line] { return load_configuration(line.options); });
+  }
   return replay(line.options, config);
 }
 

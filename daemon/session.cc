@@ -71,13 +71,13 @@ const FrameOutput& Session::process(const slam::FrameInput& input, const InputCo
   return frame;
 }
 
-void Session::remember(const slam::FrameResult& published, bool valid) {
+void Session::remember(const slam::FrameResult& published, bool valid, bool with_time) {
   ++end_.frames;
   end_.utime = published.utime;
   end_.last = published;
   if (!valid) return;
   ++end_.frames_valid;
-  end_.live_utimes.push_back(published.utime);
+  if (with_time) end_.live_utimes.push_back(published.utime);
 }
 
 const RunEnd& Session::finish(const InputCounts& in) {

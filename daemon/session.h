@@ -37,11 +37,13 @@ class Session {
   // The parts of process(), for threads of their own.
   [[nodiscard]] slam::Estimator& estimator() { return estimator_; }
   [[nodiscard]] FrameReporter& reporter() { return *reporter_; }
-  // Keeps what the end of the run is summarised from.
-  void remember(const slam::FrameResult& published, bool valid);
+  // Keeps what the end of the run is summarised from; with_time: the times of valid frames, which grow.
+  void remember(const slam::FrameResult& published, bool valid, bool with_time = true);
 
   // Finishes mapping's queue, and publishes the final trajectory and the summary.
   const RunEnd& finish(const InputCounts& in);
+  // What is known without that.
+  [[nodiscard]] const RunEnd& end() const { return end_; }
 
   [[nodiscard]] std::size_t pool_bytes() const { return pool_bytes_; }
 

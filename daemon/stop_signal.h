@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM end a replay between two frames, so that no temporary file is left behind.
+// SIGINT and SIGTERM end a run between two frames, so that no temporary file is left behind.
 #pragma once
 
 #include <csignal>
@@ -15,12 +15,29 @@ class StopOnSignal {
 
   // The signal that came, 0 for none.
   [[nodiscard]] static int signal();
+  // As if SIGTERM had come.
+  static void ask();
   // Throws std::runtime_error where one came.
   static void check();
 
  private:
   using Handler = void (*)(int);
   Handler on_interrupt_, on_terminate_;
+};
+
+// SIGHUP asks for the configuration to be read again.
+class ReloadOnSignal {
+ public:
+  ReloadOnSignal();
+  ~ReloadOnSignal();
+  ReloadOnSignal(const ReloadOnSignal&) = delete;
+  ReloadOnSignal& operator=(const ReloadOnSignal&) = delete;
+
+  // True where one came since the last call.
+  [[nodiscard]] static bool take();
+
+ private:
+  void (*on_hangup_)(int);
 };
 
 }  // namespace farpoint::daemon

@@ -1,12 +1,14 @@
 #include "drivers/socketcan.h"
 
 #include <linux/can.h>
+#include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
@@ -14,31 +16,32 @@
 namespace farpoint::drivers {
 namespace {
 
+constexpr std::size_t kMaxFilters = 32;
+
 // Without a kernel that has CAN, socket() fails with one of these.
 bool is_no_can(int error) {
   return error == EAFNOSUPPORT || error == EPROTONOSUPPORT || error == EINVAL;
+}
+
+bool is_absent(int error) {
+  return error == ENODEV || error == ENXIO || error == EBADF || error == ENOTCONN;
 }
 
 [[noreturn]] void fail(const std::string& interface, const std::string& why) {
   throw std::runtime_error("cannot use CAN interface " + interface + ": " + why);
 }
 
-int open_socket(const std::string& interface) {
-  const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-  if (fd < 0 && is_no_can(errno))
-    fail(interface, "this kernel has no CAN (modules can and can_raw are needed)");
-  if (fd < 0) fail(interface, std::strerror(errno));
-  return fd;
-}
-
-// Empty on success.
-std::string bind_to(int fd, const std::string& interface) {
-  sockaddr_can address{};
-  address.can_family = AF_CAN;
-  address.can_ifindex = static_cast<int>(if_nametoindex(interface.c_str()));
-  if (address.can_ifindex == 0) return "no such interface (see: ip link show type can)";
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return std::strerror(errno);
-  return {};
+// What the kernel is to hand on: the wanted identifiers, and the controller's own news.
+void set_filters(int fd, const std::vector<std::uint32_t>& wanted_ids) {
+  std::array<can_filter, kMaxFilters> filters{};
+  const std::size_t count = std::min(wanted_ids.size(), kMaxFilters);
+  for (std::size_t i = 0; i < count; ++i)
+    filters[i] = {wanted_ids[i] & CAN_SFF_MASK, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+  (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
+                   static_cast<socklen_t>(count * sizeof(can_filter)));
+  const can_err_mask_t errors =
+      CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_ACK | CAN_ERR_BUSERROR;
+  (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
 }
 
 can_frame to_kernel(const ipc::CanFrame& frame) {
@@ -51,44 +54,146 @@ can_frame to_kernel(const ipc::CanFrame& frame) {
 
 }  // namespace
 
-SocketCan::SocketCan(const std::string& interface) : fd_(open_socket(interface)) {
-  const std::string error = bind_to(fd_, interface);
-  if (!error.empty()) {
-    close(fd_);
-    fail(interface, error);
+const char* to_string(CanState state) {
+  switch (state) {
+    case CanState::kUnknown:
+      return "unknown";
+    case CanState::kActive:
+      return "active";
+    case CanState::kWarning:
+      return "warning";
+    case CanState::kPassive:
+      return "error passive";
+    case CanState::kBusOff:
+      return "bus off";
+    case CanState::kDown:
+      return "interface down";
+    case CanState::kAbsent:
+      return "no interface";
   }
+  return "?";
+}
+
+// --- coming and going
+
+SocketCan::SocketCan(const std::string& interface, const CanOptions& options)
+    : interface_(interface), options_(options) {
+  const int error = open_and_bind();
+  if (error == 0) return;
+  const bool kernel_has_can = fd_ >= 0 || !is_no_can(error);
+  const bool absent = is_absent(error);
+  close_socket();
+  if (!kernel_has_can) fail(interface, "this kernel has no CAN (modules can and can_raw are needed)");
+  if (absent && options.wait_for_interface) return;
+  fail(interface, absent ? "no such interface (see: ip link show type can)" : std::strerror(error));
 }
 
 SocketCan::~SocketCan() {
-  close(fd_);
+  close_socket();
 }
+
+int SocketCan::open_and_bind() {
+  fd_ = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+  if (fd_ < 0) return errno;
+  set_filters(fd_, options_.wanted_ids);
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
+  state_ = CanState::kAbsent;
+  if (address.can_ifindex == 0) return ENODEV;
+  if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return errno;
+  bound_ = true;
+  state_ = CanState::kUnknown;
+  return 0;
+}
+
+void SocketCan::close_socket() {
+  if (fd_ >= 0) close(fd_);
+  fd_ = -1;
+  bound_ = false;
+}
+
+void SocketCan::maintain() {
+  if (bound_ || given_) return;
+  close_socket();
+  if (open_and_bind() == 0) {
+    ++counts_.reopened;
+  } else {
+    close_socket();
+    state_ = CanState::kAbsent;
+  }
+}
+
+void SocketCan::note_failure(int error) {
+  ++counts_.not_sent;
+  counts_.last_errno = error;
+  // A full queue says nothing of the bus but that nobody acknowledges: error frames tell which.
+  if (error == ENOBUFS || error == EAGAIN) ++counts_.queue_full;
+  if (error == ENETDOWN) state_ = CanState::kDown;
+  if (is_absent(error)) {
+    state_ = CanState::kAbsent;
+    bound_ = false;
+  }
+}
+
+// --- frames
 
 bool SocketCan::send(std::span<const ipc::CanFrame> frames) {
   bool all = true;
-  for (const ipc::CanFrame& frame : frames) {
-    const can_frame out = to_kernel(frame);
-    if (write(fd_, &out, sizeof out) == static_cast<ssize_t>(sizeof out)) {
-      ++counts_.sent;
-    } else {
-      ++counts_.not_sent;
-      counts_.last_errno = errno;
-      all = false;
-    }
-  }
+  for (const ipc::CanFrame& frame : frames) all = send_one(frame) && all;
   return all;
+}
+
+bool SocketCan::send_one(const ipc::CanFrame& frame) {
+  if (!bound_) {
+    note_failure(ENODEV);
+    return false;
+  }
+  const can_frame out = to_kernel(frame);
+  if (write(fd_, &out, sizeof out) != static_cast<ssize_t>(sizeof out)) {
+    note_failure(errno);
+    return false;
+  }
+  ++counts_.sent;
+  if (state_ == CanState::kUnknown || state_ == CanState::kDown) state_ = CanState::kActive;
+  return true;
 }
 
 bool SocketCan::receive(ipc::CanFrame* frame) {
   can_frame in{};
-  while (read(fd_, &in, sizeof in) == static_cast<ssize_t>(sizeof in)) {
-    if ((in.can_id & (CAN_ERR_FLAG | CAN_RTR_FLAG | CAN_EFF_FLAG)) != 0 || in.len > CAN_MAX_DLEN) continue;
+  while (bound_ && read(fd_, &in, sizeof in) == static_cast<ssize_t>(sizeof in)) {
+    if ((in.can_id & CAN_ERR_FLAG) != 0) {
+      take_error_frame(in.can_id & CAN_ERR_MASK, in.data);
+      continue;
+    }
+    if ((in.can_id & (CAN_RTR_FLAG | CAN_EFF_FLAG)) != 0 || in.len > CAN_MAX_DLEN) continue;
     frame->id = in.can_id & CAN_SFF_MASK;
     frame->size = in.len;
     frame->data.fill(0);
     std::copy_n(in.data, in.len, frame->data.begin());
+    ++counts_.received;
     return true;
   }
   return false;
+}
+
+void SocketCan::take_error_frame(std::uint32_t kinds, const std::uint8_t* data) {
+  ++counts_.error_frames;
+  if ((kinds & CAN_ERR_CRTL) != 0) {
+    const std::uint8_t controller = data[1];
+    if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
+      state_ = CanState::kPassive;
+    } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
+      state_ = CanState::kWarning;
+    } else if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
+      state_ = CanState::kActive;
+    }
+  }
+  if ((kinds & CAN_ERR_RESTARTED) != 0) state_ = CanState::kActive;
+  if ((kinds & CAN_ERR_BUSOFF) != 0) {
+    state_ = CanState::kBusOff;
+    ++counts_.bus_off;
+  }
 }
 
 }  // namespace farpoint::drivers

@@ -242,12 +242,12 @@ struct ImageDecoder::Jpeg {
   }
   ~Jpeg() { jpeg_destroy_decompress(&decoder); }
 
-  ImageStatus decode(const image_t& message, GreyImage* image);
+  ImageStatus decode(Bytes file, int expected_width_px, int expected_height_px, GreyImage* image);
 };
 
 // No object with a destructor may live here: libjpeg leaves by longjmp.
-ImageStatus ImageDecoder::Jpeg::decode(const image_t& message, GreyImage* image) {
-  const Bytes file = payload(message);
+ImageStatus ImageDecoder::Jpeg::decode(Bytes file, int expected_width_px, int expected_height_px,
+                                       GreyImage* image) {
   damaged = false;
   if (setjmp(way_out) != 0) {
     jpeg_abort_decompress(&decoder);
@@ -258,7 +258,8 @@ ImageStatus ImageDecoder::Jpeg::decode(const image_t& message, GreyImage* image)
   jpeg_read_header(&decoder, TRUE);
   const auto width_px = static_cast<int>(decoder.image_width),
              height_px = static_cast<int>(decoder.image_height);
-  if (width_px != message.width || height_px != message.height || !is_possible_size(width_px, height_px)) {
+  if (width_px != expected_width_px || height_px != expected_height_px ||
+      !is_possible_size(width_px, height_px)) {
     jpeg_abort_decompress(&decoder);
     return ImageStatus::kWrongSize;
   }
@@ -303,12 +304,16 @@ ImageDecoder::ImageDecoder() : jpeg_(std::make_unique<Jpeg>()) {
 
 ImageDecoder::~ImageDecoder() = default;
 
+ImageStatus ImageDecoder::decode_jpeg(Bytes file, int width_px, int height_px, GreyImage* image) {
+  return file.empty() ? ImageStatus::kDamaged : jpeg_->decode(file, width_px, height_px, image);
+}
+
 ImageStatus ImageDecoder::decode(const image_t& message, GreyImage* image) {
   switch (message.pixel_format) {
     case image_t::PIXEL_FORMAT_GREY:
       return copy_grey(message, image);
     case image_t::PIXEL_FORMAT_MJPEG:
-      return payload(message).empty() ? ImageStatus::kDamaged : jpeg_->decode(message, image);
+      return decode_jpeg(payload(message), message.width, message.height, image);
     case image_t::PIXEL_FORMAT_PNG:
       return decode_png(message, &arena_, image);
     default:

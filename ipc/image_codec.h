@@ -50,6 +50,9 @@ class ImageDecoder {
   // Decodes message.data (its first message.size bytes). Colour becomes luma, 16 bit becomes 8. On any status
   // but kOk the image's content is unspecified.
   [[nodiscard]] ImageStatus decode(const image_t& message, GreyImage* image);
+  // One JPEG file of this size, wherever it lies: a camera's buffer.
+  [[nodiscard]] ImageStatus decode_jpeg(std::span<const std::uint8_t> file, int width_px, int height_px,
+                                        GreyImage* image);
 
  private:
   struct Jpeg;

@@ -135,7 +135,7 @@ void evaluate_bundle(BundleProblem* problem) {
         continue;
       }
       m.chi2 = lin.residual.squaredNorm();
-      if (m.chi2 < kChi2TwoDof) information += lin.d_inverse_depth.squaredNorm();
+      if (m.chi2 < kChi2TwoDof) information += point.weight * lin.d_inverse_depth.squaredNorm();
     }
     point.inverse_depth_sigma = information > 0.0 ? 1.0 / std::sqrt(information) : 1e6;
   }

@@ -4,7 +4,7 @@
 // Residual of one measurement, in units of its sigma:
 //     r = (project_c(T_camera_body T_body_world T_world_host T_host_anchor (f, rho)) - z) / sigma,     2x1
 // with homogeneous points (f, rho), so that a landmark at infinity (rho = 0) is as well conditioned as a near
-// one. Cost: sum of Huber losses of |r|, delta = kHuberDelta.
+// one. Cost: sum over the points of their weight times the Huber losses of |r|, delta = kHuberDelta.
 #pragma once
 
 #include <cstddef>
@@ -34,6 +34,8 @@ struct BundleProblem {
     double inverse_depth = 0;
     double inverse_depth_sigma = 0;  // out: given the poses
     int first_measurement = 0, measurements = 0;
+    // Above 0, at most 1. Below 1 where its measurements share an error: all are of the one host patch.
+    double weight = 1.0;
   };
 
   const Rig* rig = nullptr;

@@ -11,6 +11,10 @@ namespace farpoint::slam {
 namespace {
 
 constexpr int kParameters = 4;
+// Of what windows said, this share is remembered from one to the next, about 50 windows. Each spoke of a map
+// that the calibration of its day had bent; kept for good, the first of them would outvote all that come
+// later.
+constexpr double kRemembered = 0.98;
 using Jacobian24 = Eigen::Matrix<double, 2, kParameters>;
 using Vector4 = Eigen::Vector4d;
 
@@ -36,17 +40,16 @@ Jacobian24 parameter_derivative(const Camera& camera, const Eigen::Vector3d& poi
   return J;
 }
 
-// The normal equations of poses and calibration, inverse depths eliminated point by point.
+// The normal equations of poses and calibration, inverse depths eliminated point by point. All poses are
+// free, those too that local BA holds fixed: they were found under the calibration of their day, and fixed
+// they would speak for it.
 class WindowEquations {
  public:
   WindowEquations(const BundleProblem& problem, const Camera& camera) : p_(problem), camera_(camera) {
-    free_index_.assign(p_.poses.size(), -1);
-    for (std::size_t i = 0; i < p_.poses.size(); ++i)
-      if (!p_.poses[i].fixed) free_index_[i] = free_++;
-    poses_.resize(free_);
+    poses_.resize(static_cast<int>(p_.poses.size()));
     poses_.set_zero();
-    border_.assign(static_cast<std::size_t>(free_), Matrix64::Zero());
-    gradient_.assign(static_cast<std::size_t>(free_), Vector6d::Zero());
+    border_.assign(p_.poses.size(), Matrix64::Zero());
+    gradient_.assign(p_.poses.size(), Vector6d::Zero());
     frames_.update(p_);
   }
 
@@ -61,14 +64,14 @@ class WindowEquations {
         -(frames_.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing * d_host_pixel;
     part_ = {};
     couplings_.clear();
-    const int host = free_index_[static_cast<std::size_t>(point.host)];
     HostSums sums;
     for (int i = 0; i < point.measurements; ++i) {
-      const auto& m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
-      if (m.pose != point.host && m.chi2 <= kChi2TwoDof)
-        add_measurement(point, m, d_xyz_d_delta, host, &sums);
+      BundleProblem::Measurement m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      if (m.pose == point.host || m.chi2 > kChi2TwoDof) continue;
+      m.sigma_px /= std::sqrt(point.weight);
+      add_measurement(point, m, d_xyz_d_delta, &sums);
     }
-    if (host >= 0) add_host(host, frames_.body(point.host).t_world_body, sums);
+    add_host(point.host, sums);
     H_.noalias() += part_.H;
     g_ += part_.g;
     if (part_.hessian > 0.0) eliminate_depth();
@@ -79,16 +82,15 @@ class WindowEquations {
   bool reduce(Eigen::Matrix4d* H, Vector4* g) {
     *H = H_;
     *g = g_;
-    if (free_ == 0) return true;
-    const Eigen::Index n = 6 * free_;
+    const auto n = static_cast<Eigen::Index>(6 * border_.size());
     Eigen::MatrixXd dense(n, n), border(n, kParameters);
     Eigen::VectorXd gradient(n);
     poses_.copy_to(&dense);
-    for (int i = 0; i < free_; ++i) {
-      border.middleRows<6>(6 * i) = border_[static_cast<std::size_t>(i)];
-      gradient.segment<6>(6 * i) = gradient_[static_cast<std::size_t>(i)];
+    for (std::size_t i = 0; i < border_.size(); ++i) {
+      border.middleRows<6>(static_cast<Eigen::Index>(6 * i)) = border_[i];
+      gradient.segment<6>(static_cast<Eigen::Index>(6 * i)) = gradient_[i];
     }
-    // A little damping stands in for the scale, which a young window leaves open.
+    // A little damping stands in for place, attitude and scale of the whole, which nothing fixes.
     dense.diagonal() += (1e-6 * dense.diagonal().array() + 1e-9).matrix();
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Upper> factor(dense);
     if (factor.info() != Eigen::Success) return false;
@@ -120,7 +122,7 @@ class WindowEquations {
   };
 
   void add_measurement(const BundleProblem::Point& point, const BundleProblem::Measurement& m,
-                       const Matrix34& d_xyz_d_delta, int host, HostSums* sums) {
+                       const Matrix34& d_xyz_d_delta, HostSums* sums) {
     const BundleFrames::View& view = frames_.view(m);
     WorldLinearisation lin;
     if (!linearise_world(world_, view, m, &lin)) return;
@@ -132,29 +134,24 @@ class WindowEquations {
     part_.H.noalias() += Jd.transpose() * Jd;
     part_.g.noalias() += Jd.transpose() * lin.residual;
     part_.w.noalias() += Jd.transpose() * lin.d_inverse_depth;
-    if (host >= 0) {
-      sums->hessian.noalias() += lin.d_xyz.transpose() * lin.d_xyz;
-      sums->gradient.noalias() += lin.d_xyz.transpose() * lin.residual;
-      sums->coupling.noalias() += lin.d_xyz.transpose() * lin.d_inverse_depth;
-      sums->border.noalias() += lin.d_xyz.transpose() * Jd;
-    }
-    const int target = free_index_[static_cast<std::size_t>(m.pose)];
-    if (target < 0) return;
+    sums->hessian.noalias() += lin.d_xyz.transpose() * lin.d_xyz;
+    sums->gradient.noalias() += lin.d_xyz.transpose() * lin.residual;
+    sums->coupling.noalias() += lin.d_xyz.transpose() * lin.d_inverse_depth;
+    sums->border.noalias() += lin.d_xyz.transpose() * Jd;
     const Matrix26d J = carried(lin.d_xyz, -1.0, world_, frames_.body(m.pose).t_world_body);
-    poses_.at(target, target).noalias() += J.transpose() * J;
-    border_[static_cast<std::size_t>(target)].noalias() += J.transpose() * Jd;
-    gradient_[static_cast<std::size_t>(target)].noalias() += J.transpose() * lin.residual;
-    couple(target, J.transpose() * lin.d_inverse_depth);
-    if (host < 0) return;
+    poses_.at(m.pose, m.pose).noalias() += J.transpose() * J;
+    border_[static_cast<std::size_t>(m.pose)].noalias() += J.transpose() * Jd;
+    gradient_[static_cast<std::size_t>(m.pose)].noalias() += J.transpose() * lin.residual;
+    couple(m.pose, J.transpose() * lin.d_inverse_depth);
     const Matrix26d J_host = carried(lin.d_xyz, 1.0, world_, frames_.body(point.host).t_world_body);
-    if (host < target)
-      poses_.at(host, target).noalias() += J_host.transpose() * J;
+    if (point.host < m.pose)
+      poses_.at(point.host, m.pose).noalias() += J_host.transpose() * J;
     else
-      poses_.at(target, host).noalias() += J.transpose() * J_host;
+      poses_.at(m.pose, point.host).noalias() += J.transpose() * J_host;
   }
 
-  void add_host(int host, const Eigen::Vector3d& t_host, const HostSums& sums) {
-    const Matrix36d d = carry(world_, t_host);
+  void add_host(int host, const HostSums& sums) {
+    const Matrix36d d = carry(world_, frames_.body(host).t_world_body);
     poses_.at(host, host).noalias() += d.transpose() * (sums.hessian * d);
     border_[static_cast<std::size_t>(host)].noalias() += d.transpose() * sums.border;
     gradient_[static_cast<std::size_t>(host)].noalias() += d.transpose() * sums.gradient;
@@ -186,10 +183,8 @@ class WindowEquations {
   const BundleProblem& p_;
   const Camera& camera_;
   BundleFrames frames_;
-  std::vector<int> free_index_;
-  int free_ = 0;
   BlockMatrix poses_;
-  std::vector<Matrix64> border_;  // of the free poses, with the calibration
+  std::vector<Matrix64> border_;  // of the poses, with the calibration
   std::vector<Vector6d> gradient_;
   Eigen::Matrix4d H_ = Eigen::Matrix4d::Zero();
   Vector4 g_ = Vector4::Zero();
@@ -215,7 +210,8 @@ Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given)
     : config_(config), given_(given) {
   const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
                       config.distortion_sigma);
-  information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  prior_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  information_ = prior_;
 }
 
 CalibrationDelta Calibrator::sigma() const {
@@ -264,9 +260,9 @@ bool Calibrator::update(const BundleProblem& problem,
   const Vector4 right = information_vector_ + q.H * delta_ - q.g;
   const Vector4 best = total.ldlt().solve(right);
   if (!best.allFinite()) return false;
-  // Kept for good: the share of this window that no later window will see again.
-  information_ += q.H / free;
-  information_vector_ += (q.H * delta_ - q.g) / free;
+  // Kept: the share of this window that no later window will see again; what was kept before fades.
+  information_ = prior_ + kRemembered * (information_ - prior_) + q.H / free;
+  information_vector_ = kRemembered * information_vector_ + (q.H * delta_ - q.g) / free;
   const CalibrationDelta change = best - delta_;
   constexpr double kNoticeable_px = 0.02;
   if (image_change_px(change) < kNoticeable_px) return false;

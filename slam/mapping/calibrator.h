@@ -7,7 +7,7 @@
 // State: delta = (log focal scale, cx, cy, k1), relative to the given calibration; k1 is the first radial
 // coefficient of either camera model. Every local BA leaves a quadratic in delta after poses and inverse
 // depths are eliminated. Windows overlap, so a measurement would be counted once a window: of each quadratic
-// one part in `keyframes of the window` is kept for good.
+// one part in `keyframes of the window` is kept, and fades as the map gets better.
 #pragma once
 
 #include <vector>
@@ -51,7 +51,7 @@ class Calibrator {
   Camera given_;
   CalibrationDelta delta_ = CalibrationDelta::Zero();
   // What is kept: information matrix and vector, the prior included.
-  Eigen::Matrix4d information_;
+  Eigen::Matrix4d prior_, information_;
   Eigen::Vector4d information_vector_ = Eigen::Vector4d::Zero();
 };
 

@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <algorithm>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -171,11 +172,12 @@ ceres::Solver::Options solver_options(const BundleOptions& options) {
 
 // Adds every measurement; pose blocks come into being with their first one, so that none is without a
 // residual.
-void add_measurements(State* state, ceres::LossFunction* loss, ceres::Manifold* manifold,
+void add_measurements(State* state, std::deque<ceres::ScaledLoss>* losses, ceres::Manifold* manifold,
                       ceres::Problem* problem) {
   const BundleProblem& bundle = state->problem();
   for (std::size_t k = 0; k < bundle.points.size(); ++k) {
     const BundleProblem::Point& point = bundle.points[k];
+    ceres::ScaledLoss* loss = &(*losses)[k];
     for (int i = 0; i < point.measurements; ++i) {
       const auto index = static_cast<std::size_t>(point.first_measurement + i);
       const int target = bundle.measurements[index].pose;
@@ -211,10 +213,13 @@ void order_elimination(State* state, const ceres::Problem& problem, ceres::Param
 
 BundleSummary solve_ceres(const BundleOptions& options, BundleProblem* problem) {
   State state(problem);
-  ceres::HuberLoss loss(kHuberDelta);
+  ceres::HuberLoss huber(kHuberDelta);
+  std::deque<ceres::ScaledLoss> losses;
+  for (const BundleProblem::Point& point : problem->points)
+    losses.emplace_back(&huber, point.weight, ceres::DO_NOT_TAKE_OWNERSHIP);
   BodyPoseManifold manifold;
   ceres::Problem ceres_problem(problem_options(&state));
-  add_measurements(&state, &loss, &manifold, &ceres_problem);
+  add_measurements(&state, &losses, &manifold, &ceres_problem);
   ceres::Solver::Options solver = solver_options(options);
   order_elimination(&state, ceres_problem, solver.linear_solver_ordering.get());
 

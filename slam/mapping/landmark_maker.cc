@@ -12,9 +12,14 @@ namespace farpoint::slam {
 namespace {
 
 constexpr double kChi2TwoDof = 5.99;
-// Depth of the nearest points searched for, as a share of the median depth of what the keyframe sees: nearer
-// ones leave the image before they are of use.
-constexpr double kNearShare = 0.15;
+// Depth of the nearest points searched for, as a share of the depth that nine tenths of what the keyframe
+// sees lie beyond: nearer ones leave the image before they are of use. (Of a median, a map of distant
+// landmarks would put the limit so far out that the near ones, which hold the translation, were no longer
+// found.)
+constexpr double kNearQuantile = 0.9;  // of inverse depth
+constexpr double kNearShare = 0.3;
+// Between two keyframes whose baseline is a smaller share of that depth there is no parallax to be found.
+constexpr double kMinBaselineShare = 0.002;
 // A feature pair whose depth says it should look so much larger or smaller than it does is a mismatch.
 constexpr double kScaleTolerance = 1.8;
 // Orientation of a corner repeats to about 10 degrees; three times that, with the frame's roll taken as
@@ -68,7 +73,7 @@ LandmarkMaker::PairGeometry LandmarkMaker::relate(const Keyframe& newer, const K
   // Depth of the scene as the older keyframe sees it.
   std::vector<double> inverse_depths;
   const SE3 T_old_world = map_.T_world_camera(older).inverse();
-  // A share of the landmarks gives the median well enough.
+  // A share of the landmarks gives the quantile well enough.
   constexpr std::size_t kStride = 3;
   for (std::size_t i = 0; i < older.landmarks.size(); i += kStride) {
     const Landmark* l = map_.landmarks().get(older.landmarks[i]);
@@ -78,12 +83,13 @@ LandmarkMaker::PairGeometry LandmarkMaker::relate(const Keyframe& newer, const K
     inverse_depths.push_back(p[3] / std::max(distance, 1e-9));
   }
   if (inverse_depths.size() < 4) return g;
-  const auto middle = inverse_depths.begin() + static_cast<std::ptrdiff_t>(inverse_depths.size() / 2);
-  std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
-  const double median_inverse_depth = *middle;
-  g.max_inverse_depth = median_inverse_depth / kNearShare;
+  const auto near = inverse_depths.begin() +
+                    static_cast<std::ptrdiff_t>(kNearQuantile * static_cast<double>(inverse_depths.size()));
+  std::nth_element(inverse_depths.begin(), near, inverse_depths.end());
+  const double near_inverse_depth = *near;
+  g.max_inverse_depth = near_inverse_depth / kNearShare;
   // Without a base there is neither an epipolar line nor parallax.
-  g.valid = baseline * median_inverse_depth > 0.002;
+  g.valid = baseline * near_inverse_depth > kMinBaselineShare;
   return g;
 }
 

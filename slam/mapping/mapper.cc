@@ -23,6 +23,29 @@ constexpr std::size_t kViewNeighbours = 30, kViewSecondRing = 10, kViewSecondNei
 // that frames are posed against, and the one being made.
 constexpr std::size_t kViews = 5;
 
+// Of a homogeneous world point; 0 at infinity.
+double inverse_distance_from(const Eigen::Vector3d& place_w, const Eigen::Vector4d& point_w) {
+  return point_w[3] / std::max((point_w.head<3>() - point_w[3] * place_w).norm(), 1e-9);
+}
+
+// All measurements of a landmark are of its one host patch, and share what is wrong with it: noise in its
+// pixels, a surface that is not as flat as it was taken for. That part, so large (1 sigma), does not average
+// out.
+constexpr double kPatchSigma_px = 0.1;
+
+// n measurements of independent errors sigma and one common error s know their mean to sigma^2 / n + s^2: as
+// much as n with this weight would, were they independent.
+double shared_error_weight(const BundleProblem& problem, const BundleProblem::Point& point) {
+  double variance_px2 = 0.0;
+  for (int i = 0; i < point.measurements; ++i) {
+    const double sigma_px =
+        problem.measurements[static_cast<std::size_t>(point.first_measurement + i)].sigma_px;
+    variance_px2 += sigma_px * sigma_px;
+  }
+  variance_px2 /= point.measurements;
+  return variance_px2 / (variance_px2 + point.measurements * kPatchSigma_px * kPatchSigma_px);
+}
+
 std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
   auto view = std::make_shared<LocalView>();
   view->landmarks.resize(static_cast<std::size_t>(config.capacity.view_landmarks));
@@ -389,6 +412,7 @@ void Mapper::build_problem() {
     }
     point.measurements = static_cast<int>(problem_.measurements.size()) - point.first_measurement;
     if (point.measurements == 0) continue;
+    point.weight = shared_error_weight(problem_, point);
     problem_.points.push_back(point);
     problem_landmarks_[kept++] = lh;
   }
@@ -489,7 +513,9 @@ bool Mapper::consistent() const {
 // forgetting
 
 void Mapper::cull_keyframes(KeyframeHandle newest) {
-  // Redundant: nine tenths of what it sees, three others see at least as finely.
+  // Redundant: nine tenths of what it sees, three others see at least as finely. Landmarks count by their
+  // inverse depth: distant ones are seen by all keyframes around, and would make those redundant that alone
+  // saw the near ones, which hold the translation.
   constexpr double kRedundant = 0.9;
   constexpr int kOthers = 3;
   constexpr std::uint64_t kKeepNewest = 3;
@@ -497,14 +523,12 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
        neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
     const Keyframe& k = map_.keyframes()[h];
     if (k.id + kKeepNewest > newest_id_) continue;
-    const auto most = static_cast<double>(
-        std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
-    int points = 0, redundant = 0;
-    // Ends where so many are needed that no more points can make the rest redundant.
-    for (std::size_t i = 0; i < k.landmarks.size() && points - redundant < (1.0 - kRedundant) * most; ++i) {
+    double all = 0.0, redundant = 0.0;
+    for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
       const Landmark* l = map_.landmarks().get(k.landmarks[i]);
       if (l == nullptr || l->state == LandmarkState::kBearing) continue;
-      ++points;
+      const double inverse_distance = inverse_distance_from(k.T_world_body.t, map_.world_point(*l));
+      all += inverse_distance;
       int others = 0;
       for (const Observation& o : l->observations) {
         if (o.keyframe == h) continue;
@@ -513,9 +537,9 @@ void Mapper::cull_keyframes(KeyframeHandle newest) {
           ++others;
         if (others >= kOthers) break;
       }
-      if (others >= kOthers) ++redundant;
+      if (others >= kOthers) redundant += inverse_distance;
     }
-    if (points == 0 || redundant <= kRedundant * points) continue;
+    if (all <= 0.0 || redundant <= kRedundant * all) continue;
     map_.remove_keyframe(h);
     ++counts_.keyframes_culled;
   }

@@ -112,7 +112,7 @@ class SchurSolver {
       const auto& m = measurement(point, i);
       sum += residual_world(world, frames_.view(m), m, &r) ? huber_cost(r.squaredNorm()) : kLostCost;
     }
-    return sum;
+    return point.weight * sum;
   }
 
   void linearise_all() {
@@ -136,7 +136,7 @@ class SchurSolver {
       const auto& m = measurement(point, i);
       WorldLinearisation lin;
       if (!linearise_world(world, frames_.view(m), m, &lin)) continue;
-      const double w = huber_weight(lin.residual.squaredNorm());
+      const double w = point.weight * huber_weight(lin.residual.squaredNorm());
       block->hessian += w * lin.d_inverse_depth.squaredNorm();
       block->gradient += w * lin.d_inverse_depth.dot(lin.residual);
       if (m.pose == point.host) continue;  // host and target move together: nothing changes

@@ -69,6 +69,13 @@ TEST(CommandLine, ThreadsAndTheirRepetition) {
   EXPECT_FALSE(parse({"--replay", "run.lcm", "--speed", "2", "--schedule", "recorded"}).options.speed);
 }
 
+TEST(CommandLine, WithoutAReplayItRunsLive) {
+  EXPECT_EQ(parse({}).options.replay, "");
+  const Options o = parse({"--record", "run.lcm", "--output", "out.lcm"}).options;
+  EXPECT_EQ(o.record, "run.lcm");
+  EXPECT_EQ(o.replay, "");
+}
+
 TEST(CommandLine, HelpTeaches) {
   const std::string help = parse({"--help"}).text_and_leave;
   for (const char* word :
@@ -80,9 +87,16 @@ TEST(CommandLine, HelpTeaches) {
 }
 
 TEST(CommandLineMistakes, SayWhatWasExpectedInOneLine) {
-  EXPECT_EQ(error_of({}), "--replay LOG is missing; live cameras are not in this version (see --help)");
   EXPECT_EQ(error_of({"--replay", "run.lcm"}),
-            "--lockstep, --speed X or --schedule recorded is missing, expected one of them");
+            "--lockstep, --speed X or --schedule recorded is missing beside --replay, expected one of them");
+  for (const auto& wrong : {error_of({"--lockstep"}), error_of({"--speed", "1"}),
+                            error_of({"--schedule", "recorded"}), error_of({"--schedule-log", "a.lcm"})}) {
+    EXPECT_EQ(wrong, "--lockstep, --speed and --schedule are of a replay, expected --replay LOG with them");
+  }
+  EXPECT_EQ(error_of({"--replay", "run.lcm", "--lockstep", "--record", "again.lcm"}),
+            "--record is of a live run, expected --replay or --record");
+  EXPECT_EQ(error_of({"--record", "run.lcm", "--output", "run.lcm"}),
+            "--output run.lcm: the same file as --record, expected another");
   for (const char* speed : {"0", "-1", "nan", "1001"}) {
     EXPECT_EQ(error_of({"--replay", "run.lcm", "--speed", speed}),
               "--speed: expected a number above 0, at most 1000");

@@ -74,13 +74,13 @@ void expect_no_heap_calls(const std::string& recording, double speed) {
   EXPECT_TRUE(watched);
   std::uint64_t calls = 0;
   for (const char* name :
-       {ThreadedReplay::kCaptureThread, ThreadedReplay::kTrackingThread, ThreadedReplay::kOutputThread}) {
+       {Pipeline::kCaptureThread, Pipeline::kTrackingThread, Pipeline::kOutputThread}) {
     EXPECT_EQ(test::heap_calls(name), 0U) << name;
     calls += test::heap_calls(name);
   }
   if (calls > 0) test::print_heap_calls();
   // The watch works: mapping does allocate.
-  EXPECT_GT(test::heap_calls(ThreadedReplay::kMappingThread), 0U);
+  EXPECT_GT(test::heap_calls(Pipeline::kMappingThread), 0U);
 }
 
 TEST(RecordedThreads, NoHeapOnKittiAfterSettling) {
@@ -105,8 +105,8 @@ TEST(RecordedThreads, APlantedMallocIsFound) {
   };
   EXPECT_EQ(replay(threaded(scratch, log), quiet_config(), hooks), 0);
   test::stop_watching_heap();
-  EXPECT_GT(test::heap_calls(ThreadedReplay::kTrackingThread), 0U);
-  EXPECT_EQ(test::heap_calls(ThreadedReplay::kOutputThread), 0U);
+  EXPECT_GT(test::heap_calls(Pipeline::kTrackingThread), 0U);
+  EXPECT_EQ(test::heap_calls(Pipeline::kOutputThread), 0U);
 }
 
 // Every event of a log but those that hold measured times.

@@ -3,10 +3,10 @@
 
 #include <functional>
 
+#include "daemon/camera_file.h"
 #include "ipc/log.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
-#include "tools/import/camera_file.h"
 #include "tools/import/euroc.h"
 #include "tools/import/kitti.h"
 #include "tools/import/recording_log.h"
@@ -424,7 +424,7 @@ TEST(CameraFile, ShippedOnesAreGood) {
   for (const auto& entry : fs::directory_iterator(fs::path(FARPOINT_SOURCE_DIR) / "config/cameras")) {
     if (entry.path().extension() != ".yaml") continue;
     ++files;
-    const CameraFile camera = read_camera_file(entry.path());
+    const daemon::CameraFile camera = daemon::read_camera_file(entry.path());
     EXPECT_EQ(slam::Camera::check(camera.parameters), "") << entry.path();
   }
   EXPECT_GE(files, 3);
@@ -437,7 +437,7 @@ TEST(CameraFile, ReadsEveryKey) {
       "distortion: [0.01, 0.02, 0.003, 0.004]\nT_body_camera: [0,0,1,1, -1,0,0,2, 0,-1,0,3, "
       "0,0,0,1]\nrate_hz: 15\n"
       "row_time_s: 3e-5\n");
-  const CameraFile c = read_camera_file(root / "c.yaml");
+  const daemon::CameraFile c = daemon::read_camera_file(root / "c.yaml");
   EXPECT_EQ(c.parameters.model, slam::CameraModel::kKannalaBrandt);
   EXPECT_EQ(c.parameters.fy_px, 301.0);
   EXPECT_EQ(c.parameters.distortion[3], 0.004);
@@ -453,7 +453,8 @@ TEST_P(CameraFileDamage, IsNamed) {
   const ScratchFolder root;
   make_tum(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_camera_file(root / "camera.yaml"); }), GetParam().complaint);
+  expect_all_in(complaint_of([&] { (void)daemon::read_camera_file(root / "camera.yaml"); }),
+                GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -33,6 +33,8 @@ OPTIONS = "slam/config.h"
 # The names of the stages that the parts announce to a listener.
 STAGES = "slam/stages.h"
 SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set()}
+# The tools read camera files and refuse input as the daemon does, and speak with it.
+SHARED_WITH_TOOLS = {"daemon/errors.h", "daemon/yaml_file.h", "daemon/camera_file.h", "daemon/control_socket.h"}
 SHARED_READERS = {"slam", "slam/map", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.
 FORBIDDEN_IN_SLAM = re.compile(
@@ -82,6 +84,7 @@ def include_problem(path: str, target: str):
     else:
         allowed = ALLOWED[folder]
     shared = target in SHARED_MAY_INCLUDE and folder in SHARED_READERS
+    shared = shared or (target in SHARED_WITH_TOOLS and folder == "tools")
     if other != folder and other not in allowed and not shared:
         return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'nothing but itself'}"
     return None

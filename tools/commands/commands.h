@@ -13,6 +13,8 @@ void add_import_command(CLI::App* app, Action* action);
 void add_export_command(CLI::App* app, Action* action);
 void add_evaluate_command(CLI::App* app, Action* action);
 void add_bench_command(CLI::App* app, Action* action);
+void add_ctl_command(CLI::App* app, Action* action);
+void add_top_command(CLI::App* app, Action* action);
 void add_report_command(CLI::App* app, Action* action);
 void add_simulate_command(CLI::App* app, Action* action);
 

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "daemon/errors.h"
+
 namespace farpoint::tools {
 
 inline constexpr int kExitDone = 0;
@@ -12,10 +14,7 @@ inline constexpr int kExitFailed = 1;   // failed while running, or a condition 
 inline constexpr int kExitMisused = 2;  // wrong use, configuration or input
 
 // Wrong use or input: exit status 2.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+using daemon::InputError;
 
 // The work could not be done although the input was right (disk full, ...): exit status 1.
 class RunError : public std::runtime_error {

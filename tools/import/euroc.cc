@@ -4,11 +4,14 @@
 #include <map>
 #include <set>
 
+#include "daemon/yaml_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
-#include "tools/common/yaml_file.h"
 
 namespace farpoint::tools {
+
+using daemon::to_rigid_motion;
+using daemon::YamlFile;
 namespace {
 
 namespace fs = std::filesystem;

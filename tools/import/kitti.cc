@@ -5,11 +5,13 @@
 #include <charconv>
 #include <map>
 
+#include "daemon/yaml_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
-#include "tools/common/yaml_file.h"
 
 namespace farpoint::tools {
+
+using daemon::to_rigid_motion;
 namespace {
 
 namespace fs = std::filesystem;

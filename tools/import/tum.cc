@@ -1,8 +1,8 @@
 #include "tools/import/tum.h"
 
+#include "daemon/camera_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
-#include "tools/import/camera_file.h"
 #include "tools/trajectory/trajectory.h"
 
 namespace farpoint::tools {
@@ -11,7 +11,7 @@ namespace {
 namespace fs = std::filesystem;
 
 RecordingCamera make_camera(const fs::path& file) {
-  const CameraFile content = read_camera_file(file);
+  const daemon::CameraFile content = daemon::read_camera_file(file);
   RecordingCamera camera;
   camera.name = "rgb";
   camera.parameters = content.parameters;
@@ -62,7 +62,7 @@ Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file) {
     throw InputError(folder.string() + ": no such folder, expected one that holds rgb.txt");
   Recording recording;
   recording.cameras = {make_camera(camera_file)};
-  if (read_camera_file(camera_file).T_body_camera) recording.body_name = "body";
+  if (daemon::read_camera_file(camera_file).T_body_camera) recording.body_name = "body";
   read_images(folder, &recording);
   if (fs::exists(folder / "groundtruth.txt")) read_truth(folder / "groundtruth.txt", &recording);
   complete_cameras(camera_file, &recording);

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "daemon/camera_file.h"
 #include "tools/common/errors.h"
-#include "tools/import/camera_file.h"
 #include "tools/simulate/props.h"
 #include "tools/simulate/random.h"
 #include "tools/simulate/world_file.h"
@@ -42,7 +42,7 @@ Simulation::Simulation(const SimulationRequest& request) : request_(request) {
   duration_s_ = request.duration_s.value_or(description_.duration_s);
   CameraDescription& camera = description_.camera;
   if (!request.camera_text.empty()) {
-    const CameraFile file = parse_camera_file(request.camera_text, request.camera_file);
+    const daemon::CameraFile file = daemon::parse_camera_file(request.camera_text, request.camera_file);
     camera.parameters = file.parameters;
     if (file.T_body_camera) camera.T_body_camera = *file.T_body_camera;
     if (file.rate_hz > 0.0) camera.rate_hz = file.rate_hz;

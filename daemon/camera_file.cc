@@ -1,9 +1,9 @@
-#include "tools/import/camera_file.h"
+#include "daemon/camera_file.h"
 
-#include "tools/common/errors.h"
-#include "tools/common/yaml_file.h"
+#include "daemon/errors.h"
+#include "daemon/yaml_file.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
 namespace {
 
 constexpr double kMaxRowTime_s = 1e-3;  // 1 ms a row is half a second an image: certainly another unit
@@ -14,6 +14,13 @@ slam::CameraModel read_model(const YamlFile& yaml) {
   if (model == "kannala-brandt") return slam::CameraModel::kKannalaBrandt;
   yaml.fail(yaml.require("model"),
             "expected model 'pinhole-radtan' or 'kannala-brandt', found '" + model + "'");
+}
+
+// A camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
+slam::SE3 forward_looking() {
+  Eigen::Matrix3d R_body_camera;
+  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {Eigen::Quaterniond(R_body_camera).normalized(), Eigen::Vector3d::Zero()};
 }
 
 CameraFile read_camera(const YamlFile& yaml) {
@@ -58,4 +65,32 @@ CameraFile parse_camera_file(const std::string& content, const std::filesystem::
   return read_camera(YamlFile(file, content));
 }
 
-}  // namespace farpoint::tools
+calibration_t calibration_of(const CameraFile& camera, const std::string& name) {
+  const slam::Camera::Parameters& p = camera.parameters;
+  camera_calibration_t c{};
+  c.name = name;
+  c.model = p.model == slam::CameraModel::kKannalaBrandt ? "kannala-brandt" : "pinhole-radtan";
+  c.width = p.width_px;
+  c.height = p.height_px;
+  c.fx = p.fx_px;
+  c.fy = p.fy_px;
+  c.cx = p.cx_px;
+  c.cy = p.cy_px;
+  std::copy(p.distortion.begin(), p.distortion.end(), c.distortion);
+  const slam::SE3 T = camera.T_body_camera.value_or(forward_looking());
+  std::copy(T.t.data(), T.t.data() + 3, c.position);
+  c.orientation[0] = T.q.w();
+  c.orientation[1] = T.q.x();
+  c.orientation[2] = T.q.y();
+  c.orientation[3] = T.q.z();
+  c.rate_hz = camera.rate_hz;
+  c.row_time_s = camera.row_time_s;
+  calibration_t message{};
+  message.body_name = camera.T_body_camera ? "body" : "";
+  message.ncameras = 1;
+  message.cameras = {c};
+  message.imu_orientation[0] = 1.0;
+  return message;
+}
+
+}  // namespace farpoint::daemon

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "slam/geometry/se3.h"
+#include "slam/config.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
 
 class YamlFile {
  public:
@@ -49,4 +49,4 @@ class YamlFile {
 // Nearest rigid motion of a 3x3 or 3x4 matrix by rows where it is one to `tolerance`; false elsewhere.
 [[nodiscard]] bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motion);
 
-}  // namespace farpoint::tools
+}  // namespace farpoint::daemon

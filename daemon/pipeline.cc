@@ -1,10 +1,9 @@
-#include "daemon/threaded_replay.h"
+#include "daemon/pipeline.h"
 
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "daemon/last_line.h"
 #include "daemon/logging.h"
@@ -15,36 +14,27 @@ namespace {
 
 // How often output looks for a frame that is being tracked: what it may add to the frame's age.
 constexpr std::int64_t kLookEvery_us = 200;
+// With a camera, output looks whether it has fallen silent and what has come from the bus; more often where
+// it has to send between the images.
+constexpr std::int64_t kIdleLooksEvery_us = 20'000, kSteadyLooksEvery_us = 1'000;
 // Output wakes mapping; should output be held up by a disk, mapping looks for itself.
 constexpr std::int64_t kMappingLooksEvery_us = 10'000;
 constexpr std::int64_t kWatchEvery_us = 20'000;
 
-// Capture's one waiting place. In slices, so that a signal ends a replay within a long gap too.
-void sleep_until(double due_s, const std::atomic<bool>& stop) {
-  constexpr double kSlice_s = 0.1;
-  for (double now_s = steady_s(); now_s < due_s && !stop.load(std::memory_order_relaxed);
-       now_s = steady_s()) {
-    const double wake_s = std::min(due_s, now_s + kSlice_s);
-    timespec wake{};
-    wake.tv_sec = static_cast<time_t>(std::floor(wake_s));
-    wake.tv_nsec = static_cast<long>((wake_s - std::floor(wake_s)) * 1e9);
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr);
-  }
-}
-
 }  // namespace
 
-ThreadedReplay::ThreadedReplay(const Config& config, double speed, LogFrameSource* source, Session* session,
-                               Outputs* outputs)
+Pipeline::Pipeline(const Config& config, const PipelineOptions& options, CaptureSource* source,
+                   Session* session, Outputs* outputs)
     : config_(config.realtime),
-      speed_(speed),
+      options_(options),
+      silence_period_s_(1.0 / config.lcm.status_rate_hz),
       source_(*source),
       session_(*session),
       outputs_(*outputs),
-      images_(static_cast<std::size_t>(config.realtime.capture_queue), source->image().width_px,
-              source->image().height_px),
+      images_(static_cast<std::size_t>(config.realtime.capture_queue), options.width_px, options.height_px),
       packages_(kPackages),
-      notes_(kNotes) {
+      notes_(kNotes),
+      counts_of_absence_(4) {
   constexpr double kMegabyte = 1e6;
   const std::size_t rings = kPackages * sizeof(FramePackage) + kNotes * sizeof(Note);
   spdlog::info("memory {:<32} {:>9.3f} MB", "captured images", double(images_.bytes()) / kMegabyte);
@@ -53,52 +43,40 @@ ThreadedReplay::ThreadedReplay(const Config& config, double speed, LogFrameSourc
                4.0 * config_.stack_kb * 1024 / kMegabyte);
 }
 
-void ThreadedReplay::run(const SourceFrame& first, const ThreadHooks& hooks) {
+void Pipeline::run(const ThreadHooks& hooks) {
   hooks_ = hooks;
-  lock_memory(config_);
-  // Capture must not be kept from its clock by tracking, nor tracking by output.
-  const int priority = config_.tracking_priority;
-  const int above = priority > 0 ? priority + 1 : 0, below = priority > 1 ? priority - 1 : 0;
+  last_image_s_.store(steady_s(), std::memory_order_relaxed);
   {
-    Thread mapping(kMappingThread, config_, 0, [this] { map(); });
-    Thread tracking(kTrackingThread, config_, priority, [this] { track(); });
+    Thread mapping(kMappingThread, config_, config_.mapping, options_.realtime, [this] { map(); });
+    Thread tracking(kTrackingThread, config_, config_.tracking, options_.realtime, [this] { track(); });
     tracking_thread_ = &tracking;
-    Thread reporting(kOutputThread, config_, below, [this] { output(); });
-    Thread capturing(kCaptureThread, config_, above, [this, &first] { capture(first); });
+    Thread reporting(kOutputThread, config_, config_.output, options_.realtime, [this] { output(); });
+    Thread capturing(kCaptureThread, config_, config_.capture, options_.realtime, [this] { capture(); });
+    if (hooks_.on_started) hooks_.on_started();
     watch();
   }
   if (const std::int64_t lost = not_published_.load(); lost > 0)
     spdlog::warn("{} frames were tracked but not published: the output was behind", lost);
   if (const std::int64_t lost = not_noted_.load(); lost > 0)
     spdlog::warn("{} frames are missing in the summary: the main thread was behind", lost);
-  StopOnSignal::check();
   if (capture_error_) std::rethrow_exception(capture_error_);
+}
+
+bool Pipeline::has_progressed() {
+  const bool idle = !frames_in_work();
+  const std::int64_t turns = turns_.load(std::memory_order_relaxed);
+  const std::int64_t tracked = tracked_.load(std::memory_order_relaxed);
+  const bool progressed = turns != turns_seen_ && (tracked != tracked_seen_ || idle);
+  turns_seen_ = turns;
+  tracked_seen_ = tracked;
+  return progressed;
 }
 
 // --- capture
 
-void ThreadedReplay::capture(const SourceFrame& first) {
+void Pipeline::capture() {
   try {
-    SourceFrame frame = first;
-    StageClock clock;
-    const double start_s = steady_s();
-    do {
-      CapturedImage* image = images_.begin_push();
-      source_.swap_image(&image->image);
-      image->utime = frame.utime;
-      image->sequence = frame.sequence;
-      image->in = source_.counts();
-      image->progress = source_.progress();
-      image->decode_cpu_ms = clock.cpu_ms(timing_t::STAGE_DECODE);
-      image->decode_wall_ms = clock.wall_ms(timing_t::STAGE_DECODE);
-      image->due_s = start_s + 1e-6 * static_cast<double>(frame.utime - first.utime) / speed_;
-      sleep_until(image->due_s, stop_);
-      if (stop_.load(std::memory_order_relaxed)) break;
-      images_.push();
-      arrived_.notify();
-      if (hooks_.on_captured) hooks_.on_captured();
-      clock.new_frame();
-    } while (source_.next(&frame, &clock));
+    capture_until_end();
   } catch (...) {
     capture_error_ = std::current_exception();
   }
@@ -106,9 +84,32 @@ void ThreadedReplay::capture(const SourceFrame& first) {
   arrived_.notify();
 }
 
+void Pipeline::capture_until_end() {
+  while (!stop_.load(std::memory_order_relaxed)) {
+    CapturedImage* image = images_.begin_push();
+    const CaptureStatus status = source_.next(stop_, image);
+    turns_.fetch_add(1, std::memory_order_relaxed);
+    if (status == CaptureStatus::kEnd) return;
+    note_presence(status, image->in);
+    if (status != CaptureStatus::kImage) continue;
+    last_image_s_.store(steady_s(), std::memory_order_relaxed);
+    images_.push();
+    arrived_.notify();
+    if (hooks_.on_captured) hooks_.on_captured();
+  }
+}
+
+void Pipeline::note_presence(CaptureStatus status, const InputCounts& in) {
+  const bool away = status == CaptureStatus::kAway;
+  if (away) (void)counts_of_absence_.push(in);
+  if (away == away_.load(std::memory_order_relaxed)) return;
+  away_.store(away, std::memory_order_release);
+  if (away) arrived_.notify();
+}
+
 // --- tracking
 
-void ThreadedReplay::track() {
+void Pipeline::track() {
   for (;;) {
     const std::uint32_t seen = arrived_.seen();
     if (CapturedImage* image = images_.pop()) {
@@ -124,7 +125,7 @@ void ThreadedReplay::track() {
   jobs_.notify();
 }
 
-void ThreadedReplay::track_one(CapturedImage* image) {
+void Pipeline::track_one(CapturedImage* image) {
   // No clock of the thread's CPU time here: that is a system call. Output reads it.
   const double began_s = steady_s();
   FramePackage* package = packages_.begin_push();
@@ -155,7 +156,7 @@ void ThreadedReplay::track_one(CapturedImage* image) {
 
 // --- mapping
 
-void ThreadedReplay::map() {
+void Pipeline::map() {
   for (;;) {
     const std::uint32_t seen = jobs_.seen();
     // Asked before looking, so that no job can come after the last look.
@@ -168,12 +169,12 @@ void ThreadedReplay::map() {
 
 // --- output
 
-bool ThreadedReplay::frames_in_work() const {
+bool Pipeline::frames_in_work() const {
   const std::int64_t tracked = tracked_.load(std::memory_order_acquire);
   return images_.pushed() > images_.dropped() + tracked;
 }
 
-void ThreadedReplay::output() {
+void Pipeline::output() {
   for (;;) {
     const std::uint32_t seen = arrived_.seen();
     const bool last = tracking_ended_.load(std::memory_order_acquire);
@@ -185,14 +186,17 @@ void ThreadedReplay::output() {
     } else if (last) {
       break;
     } else {
-      arrived_.wait(seen, in_work ? kLookEvery_us : Notifier::kNoLimit);
+      report_silence_if_due();
+      const std::int64_t live_us = outputs_.is_steady() ? kSteadyLooksEvery_us : kIdleLooksEvery_us;
+      const std::int64_t idle_us = is_live() ? live_us : Notifier::kNoLimit;
+      arrived_.wait(seen, in_work ? kLookEvery_us : idle_us);
     }
   }
   output_ended_.store(true, std::memory_order_release);
   ended_.notify();
 }
 
-void ThreadedReplay::report_one(FramePackage* package) {
+void Pipeline::report_one(FramePackage* package) {
   // The last frames are reported after the thread has ended, and its clock with it.
   const double cpu_s = std::max(tracking_thread_->cpu_s(), tracking_cpu_s_);
   const double cpu_ms = 1e3 * (cpu_s - tracking_cpu_s_);
@@ -202,14 +206,39 @@ void ThreadedReplay::report_one(FramePackage* package) {
   package->clock.set(timing_t::STAGE_FRAME, cpu_ms, wall_ms);
   package->chance.age_us = std::llround(1e6 * std::max(0.0, steady_s() - package->due_s));
   const FrameOutput& frame = session_.reporter().report(package, outputs_.counts());
+  state_.store(frame.result.state, std::memory_order_relaxed);
+  last_in_ = package->in;
+  next_silence_s_ = 0.0;
   if (!notes_.push({frame.result, frame.valid, cpu_ms, package->progress}))
     not_noted_.fetch_add(1, std::memory_order_relaxed);
   if (hooks_.on_output) hooks_.on_output(frame);
 }
 
+void Pipeline::report_silence_if_due() {
+  if (!is_live()) return;
+  const double now_s = steady_s();
+  outputs_.tick(now_s);
+  // A frame that is being tracked will speak for itself.
+  if (frames_in_work()) return;
+  const bool away = away_.load(std::memory_order_acquire);
+  while (const InputCounts* counts = counts_of_absence_.front()) {
+    last_in_ = *counts;
+    counts_of_absence_.pop();
+  }
+  const double silent_s = now_s - last_image_s_.load(std::memory_order_relaxed);
+  if (!away && silent_s < options_.no_camera_after_s) return;
+  if (now_s < next_silence_s_) return;
+  next_silence_s_ = now_s + silence_period_s_;
+  const auto utime = static_cast<std::int64_t>(std::llround(1e6 * now_s));
+  const auto age_us = static_cast<std::int64_t>(std::llround(1e6 * silent_s));
+  const FrameOutput& frame = session_.reporter().report_silence(utime, age_us, last_in_, outputs_.counts());
+  state_.store(frame.result.state, std::memory_order_relaxed);
+  if (hooks_.on_output) hooks_.on_output(frame);
+}
+
 // --- the calling thread
 
-void ThreadedReplay::watch() {
+void Pipeline::watch() {
   Progress progress;
   for (;;) {
     const std::uint32_t seen = ended_.seen();
@@ -217,17 +246,17 @@ void ThreadedReplay::watch() {
     take_notes(&progress);
     if (last) break;
     if (StopOnSignal::signal() != 0) stop_.store(true, std::memory_order_relaxed);
+    if (hooks_.on_watch) hooks_.on_watch();
     ended_.wait(seen, kWatchEvery_us);
   }
   progress.clear();
 }
 
-void ThreadedReplay::take_notes(Progress* progress) {
+void Pipeline::take_notes(Progress* progress) {
   while (const Note* note = notes_.front()) {
-    session_.remember(note->published, note->valid);
-    tracking_cpu_ms_.push_back(note->tracking_cpu_ms);
-    show_progress(note->progress, note->published, static_cast<std::int64_t>(tracking_cpu_ms_.size()),
-                  progress);
+    session_.remember(note->published, note->valid, options_.remember);
+    if (tracking_cpu_ms_.size() < kMaxCpuTimes) tracking_cpu_ms_.push_back(note->tracking_cpu_ms);
+    show_progress(note->progress, note->published, frames_tracked(), progress);
     notes_.pop();
   }
 }

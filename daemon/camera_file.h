@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
-#include "slam/geometry/camera.h"
-#include "slam/geometry/se3.h"
+#include "ipc/message.h"
+#include "slam/config.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
 
 struct CameraFile {
   slam::Camera::Parameters parameters;
@@ -23,4 +23,7 @@ struct CameraFile {
 // The same for a file's content that is at hand; `file` is for complaints.
 [[nodiscard]] CameraFile parse_camera_file(const std::string& content, const std::filesystem::path& file);
 
-}  // namespace farpoint::tools
+// The calibration of a vehicle with this one camera, as a log carries it.
+[[nodiscard]] calibration_t calibration_of(const CameraFile& camera, const std::string& name);
+
+}  // namespace farpoint::daemon

@@ -1,12 +1,31 @@
-#include "tools/common/yaml_file.h"
+#include "daemon/yaml_file.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
 
-#include "tools/common/errors.h"
-#include "tools/common/text_file.h"
+#include "daemon/errors.h"
 
-namespace farpoint::tools {
+namespace farpoint::daemon {
+namespace {
+
+std::string read_file(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored))
+    throw InputError(file.string() + ": expected a file, found a folder");
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw InputError(file.string() + ": cannot be opened (" + std::strerror(errno ? errno : ENOENT) + ")");
+  std::string content{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) throw InputError(file.string() + ": cannot be read to its end");
+  return content;
+}
+
+}  // namespace
 
 YamlFile::YamlFile(std::filesystem::path file) : YamlFile(file, read_file(file)) {}
 
@@ -112,4 +131,4 @@ bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motio
   return true;
 }
 
-}  // namespace farpoint::tools
+}  // namespace farpoint::daemon

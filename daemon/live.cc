@@ -1,0 +1,331 @@
+#include "daemon/live.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <optional>
+
+#include "daemon/build_info.h"
+#include "daemon/camera_file.h"
+#include "daemon/camera_source.h"
+#include "daemon/control_socket.h"
+#include "daemon/last_line.h"
+#include "daemon/logging.h"
+#include "daemon/outputs.h"
+#include "daemon/recorder.h"
+#include "daemon/rig.h"
+#include "daemon/service_manager.h"
+#include "daemon/session.h"
+#include "daemon/stop_signal.h"
+#include "drivers/camera_path.h"
+#if FARPOINT_WITH_V4L2
+#include "drivers/v4l2_camera.h"
+#endif
+
+namespace farpoint::daemon {
+namespace {
+
+// These take effect while the daemon runs.
+constexpr std::array kRunTimeKeys = {
+    "log.level",        "lcm.status_rate_hz",       "camera.exposure",        "camera.exposure_us",
+    "camera.gain",      "camera.exposure_short_us", "camera.exposure_max_us", "camera.gain_share",
+    "camera.brightness"};
+
+constexpr double kStatusEvery_s = 1.0;
+
+bool is_run_time_key(const std::string& name) {
+  return std::find(kRunTimeKeys.begin(), kRunTimeKeys.end(), name) != kRunTimeKeys.end();
+}
+
+drivers::ExposureOptions exposure_options(const ExposureConfig& c) {
+  drivers::ExposureOptions o;
+  o.mode = static_cast<drivers::ExposureMode>(c.mode);
+  o.manual_us = c.manual_us;
+  o.manual_gain = c.manual_gain;
+  o.short_us = c.short_us;
+  o.max_us = c.max_us;
+  o.max_gain_share = c.max_gain_share;
+  o.target_grey = c.target_grey;
+  return o;
+}
+
+std::unique_ptr<drivers::Camera> make_camera(const Config& config, const calibration_t& calibration) {
+  const drivers::CameraOptions options = camera_options(config, calibration);
+  const std::string problem = drivers::CameraPath::check(options.device);
+  if (!problem.empty()) throw ConfigError("configuration: camera.device: " + problem);
+#if FARPOINT_WITH_V4L2
+  return std::make_unique<drivers::V4l2Camera>(options, std::make_unique<drivers::LinuxV4l2System>());
+#else
+  throw UsageError(
+      "this farpointd was built without a camera driver (-DFARPOINT_V4L2=ON), expected --replay");
+#endif
+}
+
+calibration_t read_calibration(const Config& config) {
+  if (config.camera.index != 0)
+    throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
+                      ", expected 0 for a live camera");
+  return calibration_of(read_camera_file(config.camera.calibration), "camera");
+}
+
+void say(const drivers::CameraEvent& event, const std::string& device) {
+  using Kind = drivers::CameraEvent::Kind;
+  const std::string why = event.error != 0 ? std::string(" (") + std::strerror(event.error) + ")" : "";
+  switch (event.kind) {
+    case Kind::kStreaming:
+      spdlog::info("camera {}: streams {} at {}{}", device, to_string(event.format),
+                   event.rate_hz > 0.0 ? fmt::format("{:.1f} Hz", event.rate_hz) : "a rate of its own",
+                   event.exposure_known ? "" : ", exposure unknown: times are of its end or beginning");
+      return;
+    case Kind::kAbsent:
+      spdlog::warn("camera {}: not there: {}{}; looking for it", device, event.what, why);
+      return;
+    case Kind::kRefused:
+      spdlog::error("camera {}: cannot be used: {}{}; trying again", device, event.what, why);
+      return;
+    case Kind::kLost:
+    case Kind::kStalled:
+      spdlog::warn("camera {}: lost: {}{}; looking for it", device, event.what, why);
+      return;
+  }
+}
+
+// Everything of one live run, made in the order in which it depends on each other.
+class LiveRun {
+ public:
+  LiveRun(const Options& options, const Config& config, std::unique_ptr<drivers::Camera> camera);
+
+  int run(const std::function<Config()>& reload, const ThreadHooks& hooks);
+
+ private:
+  [[nodiscard]] std::unique_ptr<Session> make_session();
+  [[nodiscard]] PipelineOptions pipeline_options();
+  [[nodiscard]] bool wants_results() const {
+    return !options_.output.empty() || !options_.trajectory.empty();
+  }
+  void run_threads(const ThreadHooks& hooks);
+  void tick(const std::function<Config()>& reload);
+  void take_over(const std::function<Config()>& reload);
+  void tell_status(double now_s);
+  void open_control();
+  [[nodiscard]] std::string obey(const std::string& command);
+  [[nodiscard]] std::string status_text() const;
+  int conclude();
+
+  const StopOnSignal stop_;
+  const ReloadOnSignal reload_signal_;
+  const Options& options_;
+  Config config_;
+  const calibration_t calibration_;
+  ServiceManager manager_;
+  Outputs outputs_;
+  std::optional<Recorder> recorder_;
+  std::optional<ControlSocket> control_;
+  CameraSource source_;
+  std::unique_ptr<Session> session_;
+  RealtimeReport realtime_;
+  Pipeline pipeline_;
+  double next_status_s_ = 0;
+  std::int64_t left_out_said_ = 0;
+  slam::State state_said_ = slam::State::kStarting;
+};
+
+LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<drivers::Camera> camera)
+    : options_(options),
+      config_(config),
+      calibration_(read_calibration(config)),
+      outputs_(options, config, Outputs::Use::kLive),
+      source_(camera ? std::move(camera) : make_camera(config, calibration_)),
+      session_(make_session()),
+      realtime_(config.realtime),
+      pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
+  open_control();
+  if (options_.record.empty()) return;
+  try {
+    recorder_.emplace(options_.record, calibration_, config_.camera.index);
+  } catch (const std::runtime_error& error) {
+    throw UsageError(error.what());
+  }
+  source_.record_to(&*recorder_);
+}
+
+std::unique_ptr<Session> LiveRun::make_session() {
+  try {
+    const slam::Rig rig = make_rig(calibration_, config_.camera.index);
+    spdlog::info("farpointd {}, configuration {:016x}, live from {}", build_text(), config_hash(config_),
+                 config_.camera.device);
+    return std::make_unique<Session>(config_, rig, calibration_hash(calibration_), outputs_.sinks(),
+                                     outputs_.publisher(), !options_.output.empty());
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("configuration: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw ConfigError(
+        "configuration: not enough memory for the keys of section capacity, expected smaller ones");
+  }
+}
+
+void LiveRun::open_control() {
+  if (config_.control.socket == "none") return;
+  try {
+    control_.emplace(config_.control.socket);
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; the run goes on without commands", error.what());
+  }
+}
+
+PipelineOptions LiveRun::pipeline_options() {
+  PipelineOptions o;
+  o.width_px = calibration_.cameras.front().width;
+  o.height_px = calibration_.cameras.front().height;
+  o.no_camera_after_s = config_.camera.lost_after_s;
+  o.remember = wants_results();
+  o.realtime = &realtime_;
+  return o;
+}
+
+int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks) {
+  realtime_.lock_memory();
+  realtime_.hold_cpu_latency();
+  realtime_.check_governors();
+  ThreadHooks all = hooks;
+  all.on_started = [&] {
+    realtime_.print();
+    manager_.ready();
+    if (hooks.on_started) hooks.on_started();
+  };
+  all.on_watch = [&] {
+    tick(reload);
+    if (hooks.on_watch) hooks.on_watch();
+  };
+  run_threads(all);
+  spdlog::info("stopped by signal {}", StopOnSignal::signal());
+  return conclude();
+}
+
+void LiveRun::run_threads(const ThreadHooks& hooks) {
+  std::optional<Thread> recording;
+  if (recorder_)
+    recording.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, &realtime_,
+                      [this] { recorder_->run(); });
+  // However it ends, the recorder's thread must be told.
+  struct StopRecorder {
+    std::optional<Recorder>& recorder;
+    ~StopRecorder() {
+      if (recorder) recorder->stop();
+    }
+  } stop_recorder{recorder_};
+  pipeline_.run(hooks);
+  manager_.stopping();
+}
+
+void LiveRun::tick(const std::function<Config()>& reload) {
+  for (drivers::CameraEvent event; source_.take_event(&event);) say(event, config_.camera.device);
+  if (ReloadOnSignal::take()) take_over(reload);
+  if (control_) control_->serve([this](const std::string& command) { return obey(command); });
+  const double now_s = steady_s();
+  manager_.watch(now_s, [this] { return pipeline_.has_progressed(); });
+  if (const slam::State state = pipeline_.state(); state != state_said_) {
+    spdlog::info("{} -> {}", to_string(state_said_), to_string(state));
+    state_said_ = state;
+  }
+  if (now_s >= next_status_s_) tell_status(now_s);
+}
+
+void LiveRun::tell_status(double now_s) {
+  next_status_s_ = now_s + kStatusEvery_s;
+  manager_.status(status_text());
+  if (!recorder_ || recorder_->left_out() == left_out_said_) return;
+  left_out_said_ = recorder_->left_out();
+  spdlog::warn("{}: {} images left out so far: the disk cannot follow, or is full", options_.record,
+               left_out_said_);
+}
+
+std::string LiveRun::status_text() const {
+  return fmt::format("{}, {} frames tracked, {} dropped", to_string(pipeline_.state()),
+                     pipeline_.frames_tracked(), pipeline_.frames_dropped());
+}
+
+std::string LiveRun::obey(const std::string& command) {
+  if (command == "status") return "ok " + status_text();
+  spdlog::info("command: {}", command.substr(0, 40));
+  if (command == "reset-odom") {
+    session_->reporter().reset_odom();
+    return "ok the next pose is the origin of odom";
+  }
+  if (command == "stop") {
+    StopOnSignal::ask();
+    return "ok stopping";
+  }
+  return "error: unknown command, expected status, reset-odom or stop";
+}
+
+void LiveRun::take_over(const std::function<Config()>& reload) {
+  manager_.reloading();
+  try {
+    const Config wanted = reload();
+    const std::string restart = keys_that_need_a_restart(config_, wanted);
+    config_.log.level = wanted.log.level;
+    config_.lcm.status_rate_hz = wanted.lcm.status_rate_hz;
+    config_.camera.exposure = wanted.camera.exposure;
+    set_log_level(config_.log.level);
+    session_->reporter().set_status_rate(config_.lcm.status_rate_hz);
+    source_.set_exposure(exposure_options(config_.camera.exposure));
+    spdlog::info("configuration read again{}", restart.empty() ? "" : "; after a restart only: " + restart);
+  } catch (const std::exception& error) {
+    spdlog::error("configuration not taken over: {}", error.what());
+  }
+  manager_.ready();
+}
+
+int LiveRun::conclude() {
+  const RunEnd& end = wants_results() ? session_->finish(InputCounts{}) : session_->end();
+  std::vector<std::string> written = outputs_.close(end);
+  if (recorder_) {
+    recorder_->close();
+    written.push_back(options_.record);
+  }
+  std::fprintf(
+      line_stream(options_), "%s\n",
+      last_line(end, InputCounts{}, pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
+          .c_str());
+  return 0;
+}
+
+}  // namespace
+
+drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration) {
+  const CameraConfig& c = config.camera;
+  const camera_calibration_t& camera = calibration.cameras.front();
+  drivers::CameraOptions o;
+  o.device = c.device;
+  o.width_px = camera.width;
+  o.height_px = camera.height;
+  o.rate_hz = c.rate_hz;
+  o.format = static_cast<drivers::CameraFormat>(c.format);
+  o.buffers = c.buffers;
+  o.stamp_point = static_cast<drivers::StampPoint>(c.stamp);
+  o.readout_s = camera.row_time_s > 0.0 ? camera.row_time_s * camera.height : 0.0;
+  o.time_offset_us = c.time_offset_us;
+  o.stall_s = c.stall_s;
+  o.exposure = exposure_options(c.exposure);
+  return o;
+}
+
+std::string keys_that_need_a_restart(const Config& running, const Config& wanted) {
+  std::string names;
+  for (const ConfigKey& key : config_keys()) {
+    if (is_run_time_key(key.name) || key.get(running) == key.get(wanted)) continue;
+    names += (names.empty() ? "" : ", ") + key.name;
+  }
+  return names;
+}
+
+int live(const Options& options, const Config& config, const std::function<Config()>& reload,
+         LiveEnvironment environment) {
+  LiveRun run(options, config, std::move(environment.camera));
+  return run.run(reload, environment.hooks);
+}
+
+}  // namespace farpoint::daemon

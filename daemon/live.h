@@ -1,0 +1,32 @@
+// The daemon on the vehicle: a camera in, until it is told to stop.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "daemon/config.h"
+#include "daemon/options.h"
+#include "daemon/pipeline.h"
+#include "drivers/camera.h"
+
+namespace farpoint::daemon {
+
+// What tests put in the machine's place.
+struct LiveEnvironment {
+  std::unique_ptr<drivers::Camera> camera;  // null: the one that is configured
+  ThreadHooks hooks;
+};
+
+// Runs until SIGTERM or SIGINT. SIGHUP calls `reload` and takes over what may change meanwhile; what may not
+// is said. Returns the exit status. Throws UsageError, ConfigError or InputError before the first frame,
+// std::runtime_error while running.
+int live(const Options& options, const Config& config, const std::function<Config()>& reload,
+         LiveEnvironment environment = {});
+
+// The options of the camera driver.
+[[nodiscard]] drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration);
+
+// Names of the keys whose values differ and that do not take effect before a restart; empty: none.
+[[nodiscard]] std::string keys_that_need_a_restart(const Config& running, const Config& wanted);
+
+}  // namespace farpoint::daemon

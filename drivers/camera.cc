@@ -1,0 +1,21 @@
+#include "drivers/camera.h"
+
+namespace farpoint::drivers {
+
+const char* to_string(CameraFormat format) {
+  switch (format) {
+    case CameraFormat::kAuto:
+      return "any format";
+    case CameraFormat::kGrey:
+      return "GREY";
+    case CameraFormat::kNv12:
+      return "NV12";
+    case CameraFormat::kYuyv:
+      return "YUYV";
+    case CameraFormat::kMjpeg:
+      return "MJPEG";
+  }
+  return "?";
+}
+
+}  // namespace farpoint::drivers

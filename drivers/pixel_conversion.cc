@@ -1,0 +1,58 @@
+#include "drivers/pixel_conversion.h"
+
+#include <cstring>
+
+namespace farpoint::drivers {
+namespace {
+
+bool has_all_rows(std::span<const std::uint8_t> bytes, const PixelLayout& layout, int bytes_a_pixel) {
+  const std::int64_t row_bytes = std::int64_t{layout.width_px} * bytes_a_pixel;
+  if (layout.width_px <= 0 || layout.height_px <= 0 || layout.row_stride < row_bytes) return false;
+  const std::int64_t needed = std::int64_t{layout.row_stride} * (layout.height_px - 1) + row_bytes;
+  return static_cast<std::int64_t>(bytes.size()) >= needed;
+}
+
+void set_size(const PixelLayout& layout, ipc::GreyImage* image) {
+  image->width_px = layout.width_px;
+  image->height_px = layout.height_px;
+  image->pixels.resize(static_cast<std::size_t>(layout.width_px) *
+                       static_cast<std::size_t>(layout.height_px));
+}
+
+}  // namespace
+
+bool grey_rows_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout,
+                       ipc::GreyImage* image) {
+  if (!has_all_rows(bytes, layout, 1)) return false;
+  set_size(layout, image);
+  const auto width = static_cast<std::size_t>(layout.width_px),
+             stride = static_cast<std::size_t>(layout.row_stride);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(layout.height_px); ++row)
+    std::memcpy(image->pixels.data() + row * width, bytes.data() + row * stride, width);
+  return true;
+}
+
+bool yuyv_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout, ipc::GreyImage* image) {
+  if (!has_all_rows(bytes, layout, 2)) return false;
+  set_size(layout, image);
+  const auto width = static_cast<std::size_t>(layout.width_px),
+             stride = static_cast<std::size_t>(layout.row_stride);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(layout.height_px); ++row) {
+    const std::uint8_t* from = bytes.data() + row * stride;
+    std::uint8_t* to = image->pixels.data() + row * width;
+    for (std::size_t x = 0; x < width; ++x) to[x] = from[2 * x];
+  }
+  return true;
+}
+
+double mean_grey(const ipc::GreyImage& image) {
+  constexpr int kStep = 8;
+  std::int64_t sum = 0, count = 0;
+  for (int y = kStep / 2; y < image.height_px; y += kStep) {
+    const std::uint8_t* row = image.data() + static_cast<std::ptrdiff_t>(y) * image.width_px;
+    for (int x = kStep / 2; x < image.width_px; x += kStep, ++count) sum += row[x];
+  }
+  return count > 0 ? double(sum) / double(count) : 0.0;
+}
+
+}  // namespace farpoint::drivers

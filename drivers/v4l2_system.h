@@ -1,0 +1,39 @@
+// The system calls that a V4L2 camera needs, so that tests can be the kernel.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "drivers/camera_time.h"
+
+namespace farpoint::drivers {
+
+// As the calls of the same name; errors are negative errno. No heap calls.
+class V4l2System {
+ public:
+  virtual ~V4l2System() = default;
+  [[nodiscard]] virtual int open(const char* path) = 0;
+  virtual void close(int fd) = 0;
+  // Repeated where a signal came in between.
+  [[nodiscard]] virtual int ioctl(int fd, unsigned long request, void* argument) = 0;
+  // Null where it cannot be mapped.
+  [[nodiscard]] virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;
+  virtual void unmap(void* memory, std::size_t bytes) = 0;
+  // Until a frame or an error is there: 1; 0 after timeout_ms, or where a signal came. fd -1: only waits.
+  virtual int wait(int fd, int timeout_ms) = 0;
+  [[nodiscard]] virtual ClockReadings clocks() = 0;
+};
+
+class LinuxV4l2System final : public V4l2System {
+ public:
+  [[nodiscard]] int open(const char* path) override;
+  void close(int fd) override;
+  [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
+  [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
+  void unmap(void* memory, std::size_t bytes) override;
+  int wait(int fd, int timeout_ms) override;
+  [[nodiscard]] ClockReadings clocks() override { return read_clocks(); }
+};
+
+}  // namespace farpoint::drivers

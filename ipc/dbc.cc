@@ -1,0 +1,159 @@
+#include "ipc/dbc.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+namespace farpoint::ipc {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint32_t kMaxStandardId = 0x7ff;
+
+// Takes a line apart from its front.
+class Scanner {
+ public:
+  explicit Scanner(std::string_view text) : rest_(text) {}
+
+  [[nodiscard]] bool accept(char c) {
+    skip_blanks();
+    if (rest_.empty() || rest_.front() != c) return false;
+    rest_.remove_prefix(1);
+    return true;
+  }
+  // Letters, digits and underscores.
+  [[nodiscard]] std::string_view word() {
+    skip_blanks();
+    std::size_t end = 0;
+    while (end < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[end])) || rest_[end] == '_'))
+      ++end;
+    return take(end);
+  }
+  template <typename T>
+  [[nodiscard]] bool number(T* value) {
+    skip_blanks();
+    if (rest_.starts_with('+')) rest_.remove_prefix(1);
+    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), *value);
+    if (error != std::errc()) return false;
+    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+    return true;
+  }
+  [[nodiscard]] std::string_view up_to(char c) { return take(std::min(rest_.find(c), rest_.size())); }
+
+ private:
+  std::string_view take(std::size_t n) {
+    const std::string_view taken = rest_.substr(0, n);
+    rest_.remove_prefix(n);
+    return taken;
+  }
+  void skip_blanks() {
+    while (!rest_.empty() && (rest_.front() == ' ' || rest_.front() == '\t')) rest_.remove_prefix(1);
+  }
+  std::string_view rest_;
+};
+
+// "BO_ 291 Wheels: 8 ABS": true where the line is this message.
+bool read_message(std::string_view line, const std::string& name, DbcSignal* signal) {
+  Scanner s(line);
+  if (s.word() != "BO_") return false;
+  return s.number(&signal->id) && s.word() == name && s.accept(':') && s.number(&signal->size);
+}
+
+// " SG_ Speed : 7|16@0+ (0.01,0) [0|655] "km/h" Receiver", behind the name.
+bool read_layout(Scanner s, DbcSignal* d) {
+  unsigned order = 2;
+  if (!s.accept(':') || !s.number(&d->start) || !s.accept('|') || !s.number(&d->length) || !s.accept('@') ||
+      !s.number(&order) || order > 1)
+    return false;
+  d->is_motorola = order == 0;
+  d->is_signed = s.accept('-');
+  if (!d->is_signed && !s.accept('+')) return false;
+  const bool scaled =
+      s.accept('(') && s.number(&d->factor) && s.accept(',') && s.number(&d->offset) && s.accept(')');
+  const bool ranged =
+      scaled && s.accept('[') && s.number(&d->min) && s.accept('|') && s.number(&d->max) && s.accept(']');
+  if (!ranged || !s.accept('"')) return false;
+  d->unit = std::string(s.up_to('"'));
+  return true;
+}
+
+// The bit of the frame that holds bit i of the value, 0 the least significant; nothing where it lies outside.
+std::optional<unsigned> position_of(const DbcSignal& d, unsigned i) {
+  if (!d.is_motorola) return d.start + i;
+  // Motorola: from the most significant bit on, downwards within a byte, then on with the next byte's bit 7.
+  const unsigned from_top = d.length - 1 - i;
+  const unsigned in_row = 7 - d.start % 8 + from_top;  // bits behind the first byte's bit 7
+  return (d.start / 8 + in_row / 8) * 8 + (7 - in_row % 8);
+}
+
+bool fits(const DbcSignal& d) {
+  if (d.length == 0 || d.length > 64 || d.size == 0 || d.size > 8 || d.start >= 8 * d.size) return false;
+  for (unsigned i = 0; i < d.length; ++i)
+    if (position_of(d, i).value_or(64) >= 8 * d.size) return false;
+  return true;
+}
+
+}  // namespace
+
+double DbcSignal::value(const CanFrame& frame) const {
+  if (frame.id != id || frame.size < size) return kNan;
+  std::uint64_t raw = 0;
+  for (unsigned i = 0; i < length; ++i) {
+    const unsigned bit = *position_of(*this, i);
+    if ((frame.data.at(bit / 8) >> (bit % 8) & 1) != 0) raw |= std::uint64_t{1} << i;
+  }
+  double number = static_cast<double>(raw);
+  if (is_signed && (raw >> (length - 1) & 1) != 0) {
+    const std::uint64_t ones = length == 64 ? 0 : ~std::uint64_t{0} << length;
+    number = static_cast<double>(static_cast<std::int64_t>(raw | ones));
+  }
+  const double physical = number * factor + offset;
+  // A sensor says 'not available' with a value beyond its range.
+  const double tolerance = 0.5 * std::abs(factor);
+  const bool in_range = min == max || (physical >= min - tolerance && physical <= max + tolerance);
+  return in_range ? physical : kNan;
+}
+
+DbcSignal read_dbc_signal(const std::string& path, const std::string& message, const std::string& signal) {
+  std::ifstream file(path);
+  if (!file)
+    throw std::runtime_error(path + ": cannot be opened (" + std::strerror(errno) + "), expected a DBC file");
+  DbcSignal found;
+  bool in_message = false, message_seen = false;
+  int number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    const auto fail = [&](const std::string& why) {
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": " + why);
+    };
+    Scanner s(line);
+    const std::string_view head = s.word();
+    if (head == "BO_") {
+      in_message = read_message(line, message, &found);
+      message_seen = message_seen || in_message;
+      continue;
+    }
+    if (!in_message || head != "SG_" || s.word() != signal) continue;
+    if (found.id > kMaxStandardId) fail(message + " has an extended identifier, expected one of 11 bits");
+    if (!read_layout(s, &found))
+      fail("signal " + signal + ": expected 'SG_ " + signal +
+           " : start|length@order sign (factor,offset) [min|max] \"unit\"'");
+    if (!fits(found))
+      fail("signal " + signal + " lies outside its frame of " + std::to_string(found.size) + " bytes");
+    return found;
+  }
+  throw std::runtime_error(
+      path + ": " +
+      (message_seen ? "message " + message + " has no signal " + signal : "no message " + message) +
+      ", expected MESSAGE.SIGNAL of this file");
+}
+
+}  // namespace farpoint::ipc

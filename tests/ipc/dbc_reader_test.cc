@@ -1,0 +1,88 @@
+#include "ipc/dbc.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "tests/ipc/scratch.h"
+
+namespace farpoint::ipc {
+namespace {
+
+constexpr const char* kText =
+    "VERSION \"\"\n"
+    "BO_ 291 Wheels: 8 ABS\n"
+    " SG_ FrontLeft : 7|16@0+ (0.01,0) [0|600] \"km/h\"  Vector__XXX\n"
+    " SG_ FrontRight : 16|16@1+ (0.01,0) [0|600] \"km/h\"  Vector__XXX\n"
+    " SG_ YawRate : 39|12@0- (0.1,0) [-200|200] \"deg/s\"  Vector__XXX\n"
+    " SG_ Outside : 60|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
+    " SG_ Broken : 60|8\n"
+    "BO_ 2147484000 Far: 8 ABS\n"
+    " SG_ X : 0|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
+    "BO_ 292 Other: 4 ABS\n"
+    " SG_ FrontLeft : 0|8@1- (1,-3) [0|0] \"\"  Vector__XXX\n";
+
+class Dbc : public testing::Test {
+ protected:
+  Dbc() : path_(scratch_.path("a.dbc")) { std::ofstream(path_) << kText; }
+  [[nodiscard]] std::string complaint(const std::string& message, const std::string& signal) const {
+    try {
+      (void)read_dbc_signal(path_, message, signal);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  }
+  const test::Scratch scratch_;
+  const std::string path_;
+};
+
+TEST_F(Dbc, MotorolaAndIntel) {
+  // 0x1234 = 4660: 46.6 km/h. Motorola from bit 7: bytes 0 and 1 as written; Intel: low byte first.
+  const CanFrame frame{291, 8, {0x12, 0x34, 0x34, 0x12, 0, 0, 0, 0}};
+  const DbcSignal left = read_dbc_signal(path_, "Wheels", "FrontLeft");
+  EXPECT_EQ(left.unit, "km/h");
+  EXPECT_NEAR(left.value(frame), 46.60, 1e-9);
+  EXPECT_NEAR(read_dbc_signal(path_, "Wheels", "FrontRight").value(frame), 46.60, 1e-9);
+}
+
+TEST_F(Dbc, SignedMotorolaAcrossBytes) {
+  // Twelve bits from bit 39 (byte 4, bit 7): byte 4 and the upper half of byte 5. -5 = 0xFFB.
+  const DbcSignal yaw = read_dbc_signal(path_, "Wheels", "YawRate");
+  EXPECT_NEAR(yaw.value({291, 8, {0, 0, 0, 0, 0xFF, 0xB0, 0, 0}}), -0.5, 1e-9);
+  EXPECT_NEAR(yaw.value({291, 8, {0, 0, 0, 0, 0x01, 0x2F, 0, 0}}), 1.8, 1e-9);
+}
+
+TEST_F(Dbc, OfTwoSignalsOfANameThatOfTheMessage) {
+  const DbcSignal other = read_dbc_signal(path_, "Other", "FrontLeft");
+  EXPECT_EQ(other.id, 292U);
+  EXPECT_NEAR(other.value({292, 4, {0xFF}}), -4.0, 1e-9);
+}
+
+TEST_F(Dbc, WhatIsNoValueIsNaN) {
+  const DbcSignal left = read_dbc_signal(path_, "Wheels", "FrontLeft");
+  EXPECT_TRUE(std::isnan(left.value({290, 8, {}})));            // another frame
+  EXPECT_TRUE(std::isnan(left.value({291, 4, {}})));            // cut off
+  EXPECT_TRUE(std::isnan(left.value({291, 8, {0xFF, 0xFF}})));  // beyond the range: not available
+}
+
+TEST_F(Dbc, MistakesAreNamed) {
+  EXPECT_EQ(complaint("Nowhere", "X"), path_ + ": no message Nowhere, expected MESSAGE.SIGNAL of this file");
+  EXPECT_EQ(complaint("Wheels", "Nothing"),
+            path_ + ": message Wheels has no signal Nothing, expected MESSAGE.SIGNAL of this file");
+  EXPECT_EQ(complaint("Wheels", "Outside"), path_ + ":6: signal Outside lies outside its frame of 8 bytes");
+  EXPECT_NE(complaint("Wheels", "Broken").find(":7: signal Broken: expected"), std::string::npos);
+  EXPECT_NE(complaint("Far", "X").find("extended identifier"), std::string::npos);
+  EXPECT_THROW((void)read_dbc_signal("/nonexistent.dbc", "A", "B"), std::runtime_error);
+}
+
+// The shipped file describes our own frames: its signals can be read too.
+TEST(DbcFile, ReadsTheShippedOne) {
+  const DbcSignal age =
+      read_dbc_signal(std::string(FARPOINT_SOURCE_DIR) + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");
+  EXPECT_EQ(age.id, 0x300U);
+}
+
+}  // namespace
+}  // namespace farpoint::ipc

@@ -1,0 +1,91 @@
+#include "tools/top/board.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace farpoint::tools {
+namespace {
+
+status_t status_of(int state) {
+  status_t s{};
+  s.state = static_cast<std::int8_t>(state);
+  s.quality = 87;
+  s.frames_received = 1234;
+  s.images_flagged = 5;
+  s.can_state = status_t::CAN_BUS_OFF;
+  s.memory_pool_bytes = 101'000'000;
+  s.build = "0.1.0 abc";
+  return s;
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(Top, NobodyHeardIsTheFirstThingSaid) {
+  const std::string text = Board().render(10.0, false);
+  EXPECT_EQ(text.find("no farpointd heard"), 0U) << text;
+}
+
+TEST(Top, ShowsStateRatesAndHealth) {
+  Board board;
+  for (int i = 0; i <= 60; ++i) {
+    const double now_s = 100.0 + i / 30.0;
+    odometry_t o{};
+    o.valid = 1;
+    o.orientation[0] = o.orientation[3] = 0.70710678;  // a quarter turn to the left
+    o.position[0] = 12.34;
+    o.velocity[0] = 3.0;
+    o.velocity[1] = 4.0;
+    board.take(o, now_s);
+    timing_t t{};
+    t.latency_ms = i;
+    t.wall_ms[timing_t::STAGE_TRACKING] = 7.0;
+    t.resident_bytes = 180'000'000;
+    board.take(t, now_s);
+    if (i % 6 == 0) board.take(status_of(status_t::STATE_TRACKING), now_s);
+  }
+  const std::string text = board.render(102.0, false);
+  for (const char* part : {"TRACKING   quality 87", "odometry 30.0 Hz   status 5.0 Hz", "x 12.34",
+                           "heading 90.0 deg   speed 5.00 units/s", "p50 30.0  p99 59.0  max 60.0 ms",
+                           "p50 7.0  p99 7.0  max 7.0 ms", "1234 images", "5 flagged", "CAN       bus off",
+                           "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
+    EXPECT_TRUE(has(text, part)) << part << "\n" << text;
+  }
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
+  EXPECT_FALSE(has(text, "\x1b"));
+  EXPECT_TRUE(has(board.render(102.0, true), "\x1b[1;32mTRACKING"));
+}
+
+TEST(Top, ADaemonThatFellSilentIsSaidInRed) {
+  Board board;
+  board.take(status_of(status_t::STATE_TRACKING), 100.0);
+  EXPECT_TRUE(has(board.render(107.0, true), "\x1b[1;31mSILENT for 7 s"));
+}
+
+TEST(Top, WithoutAPoseNoNumbersAreShown) {
+  Board board;
+  board.take(status_of(status_t::STATE_NO_CAMERA), 100.0);
+  odometry_t o{};
+  o.position[0] = 99.0;
+  board.take(o, 100.0);
+  const std::string text = board.render(100.1, false);
+  EXPECT_TRUE(has(text, "NO CAMERA"));
+  EXPECT_TRUE(has(text, "no valid pose"));
+  EXPECT_FALSE(has(text, "99.00"));
+}
+
+TEST(Top, EveryStateHasItsName) {
+  EXPECT_STREQ(state_name(status_t::STATE_STARTING), "starting");
+  EXPECT_STREQ(state_name(status_t::STATE_RELOCALISING), "relocalising");
+  EXPECT_STREQ(state_name(status_t::STATE_NO_CAMERA), "no camera");
+  EXPECT_STREQ(state_name(99), "?");
+  EXPECT_STREQ(can_state_name(status_t::CAN_ABSENT), "absent");
+  EXPECT_STREQ(can_state_name(-1), "?");
+}
+
+}  // namespace
+}  // namespace farpoint::tools

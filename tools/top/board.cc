@@ -1,0 +1,164 @@
+#include "tools/top/board.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace farpoint::tools {
+namespace {
+
+constexpr double kStale_s = 1.0;  // the status comes five times a second
+constexpr double kMegabyte = 1e6, kDegrees_per_rad = 57.29577951308232;
+
+constexpr const char *kRed = "\x1b[1;31m", *kYellow = "\x1b[1;33m", *kGreen = "\x1b[1;32m",
+                     *kPlain = "\x1b[0m";
+
+std::string painted(const std::string& text, const char* colour, bool with_colour) {
+  return with_colour ? colour + text + kPlain : text;
+}
+
+const char* colour_of(int state) {
+  if (state == status_t::STATE_TRACKING) return kGreen;
+  if (state == status_t::STATE_LOST || state == status_t::STATE_NO_CAMERA) return kRed;
+  return kYellow;
+}
+
+void forget_before(double time_s, std::deque<double>* times) {
+  while (!times->empty() && times->front() < time_s) times->pop_front();
+}
+
+double rate_hz(const std::deque<double>& times_s, double now_s, double window_s) {
+  if (times_s.size() < 2) return 0.0;
+  const auto first = std::lower_bound(times_s.begin(), times_s.end(), now_s - window_s);
+  const auto count = std::distance(first, times_s.end());
+  if (count < 2) return 0.0;
+  return double(count - 1) / (times_s.back() - *first);
+}
+
+// p50, p99, maximum, of values that are not negative.
+std::string spread(std::vector<double> values) {
+  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !(v >= 0.0); }),
+               values.end());
+  if (values.empty()) return "-";
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double q) { return values[static_cast<std::size_t>(q * double(values.size() - 1))]; };
+  return fmt::format("p50 {:.1f}  p99 {:.1f}  max {:.1f} ms", at(0.5), at(0.99), values.back());
+}
+
+const char* scale_text(int scale) {
+  if (scale == status_t::SCALE_METRIC) return "metric";
+  return scale == status_t::SCALE_ASSUMED ? "assumed" : "unknown";
+}
+
+}  // namespace
+
+const char* state_name(int state) {
+  constexpr std::array names = {"starting", "initialising", "settling",     "tracking",
+                                "degraded", "lost",         "relocalising", "no camera"};
+  return state >= 0 && state < int(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
+}
+
+const char* can_state_name(int state) {
+  constexpr std::array names = {"unknown", "active", "warning", "error passive", "bus off", "down", "absent"};
+  return state >= 0 && state < int(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
+}
+
+void Board::take(const odometry_t& message, double now_s) {
+  odometry_ = message;
+  odometry_s_ = now_s;
+  odometry_times_s_.push_back(now_s);
+  forget_before(now_s - kWindow_s, &odometry_times_s_);
+}
+
+void Board::take(const status_t& message, double now_s) {
+  status_ = message;
+  status_s_ = now_s;
+  status_times_s_.push_back(now_s);
+  forget_before(now_s - kWindow_s, &status_times_s_);
+}
+
+void Board::take(const timing_t& message, double now_s) {
+  timing_ = message;
+  timings_.push_back({now_s, message.latency_ms, message.wall_ms[timing_t::STAGE_TRACKING]});
+  while (timings_.front().arrived_s < now_s - kWindow_s) timings_.pop_front();
+}
+
+std::string Board::render(double now_s, bool colour) const {
+  std::string text = state_lines(now_s, colour);
+  if (status_) text += pose_lines() + time_lines(now_s) + count_lines();
+  if (undecodable_ > 0) text += fmt::format("{} messages of another version of the types\n", undecodable_);
+  return text;
+}
+
+std::string Board::state_lines(double now_s, bool colour) const {
+  if (!status_) return painted("no farpointd heard", kRed, colour) + "  (FARPOINT_STATUS has not come yet)\n";
+  const status_t& s = *status_;
+  std::string name = state_name(s.state);
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::toupper(c); });
+  std::string line = painted(name, colour_of(s.state), colour);
+  if (now_s - status_s_ > kStale_s) {
+    line = painted(fmt::format("SILENT for {:.0f} s", now_s - status_s_), kRed, colour) + ", last " + name;
+  }
+  line += s.quality >= 0 ? fmt::format("   quality {}", s.quality) : "   quality -";
+  line += fmt::format("   scale {}   map {}   resets {}   lost {} times\n", scale_text(s.scale_state),
+                      s.map_id, s.reset_counter, s.times_lost);
+  if (!s.message.empty()) line += s.message.substr(0, 98) + "\n";
+  return line + "\n";
+}
+
+std::string Board::pose_lines() const {
+  if (!odometry_ || !odometry_->valid) return "odom      no valid pose\n";
+  const odometry_t& o = *odometry_;
+  const double w = o.orientation[0], x = o.orientation[1], y = o.orientation[2], z = o.orientation[3];
+  const double heading = kDegrees_per_rad * std::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+  const char* unit = o.scale_state == status_t::SCALE_UNKNOWN ? "units" : "m";
+  return fmt::format("odom      x {:.2f}  y {:.2f}  z {:.2f} {}   heading {:.1f} deg   speed {:.2f} {}/s\n",
+                     o.position[0], o.position[1], o.position[2], unit, heading,
+                     std::hypot(o.velocity[0], o.velocity[1], o.velocity[2]), unit);
+}
+
+std::string Board::time_lines(double now_s) const {
+  std::vector<double> latency_ms, tracking_ms;
+  for (const Times& t : timings_) {
+    latency_ms.push_back(t.latency_ms);
+    tracking_ms.push_back(t.tracking_ms);
+  }
+  std::string text =
+      fmt::format("rates     odometry {:.1f} Hz   status {:.1f} Hz\n",
+                  rate_hz(odometry_times_s_, now_s, kWindow_s), rate_hz(status_times_s_, now_s, kWindow_s));
+  text += "latency   " + spread(std::move(latency_ms)) + "   (mid-exposure to output)\n";
+  return text + "tracking  " + spread(std::move(tracking_ms)) + "\n";
+}
+
+std::string Board::count_lines() const {
+  const status_t& s = *status_;
+  std::string text;
+  text += fmt::format("queues    capture {} (most {})   mapping {} ({})   publish {} ({})\n", s.capture_queue,
+                      s.capture_queue_max, s.mapping_queue, s.mapping_queue_max, s.publish_queue,
+                      s.publish_queue_max);
+  text += fmt::format(
+      "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
+      s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
+      s.camera_losses);
+  text += fmt::format("frames    {} tracked   {} valid   {} keyframes not made\n", s.frames_tracked,
+                      s.frames_valid, s.keyframes_dropped);
+  text += fmt::format("map       {} keyframes   {} landmarks   {} virtual points\n", s.keyframes, s.landmarks,
+                      s.vmps);
+  text += fmt::format("CAN       {}   {} not sent   {} bus-offs   {} received\n", can_state_name(s.can_state),
+                      s.can_send_errors, s.can_bus_offs, s.can_received);
+  text += fmt::format("errors    {} LCM   {} log   {} times backwards\n", s.lcm_send_errors,
+                      s.log_write_errors, s.times_backwards);
+  if (timing_) {
+    text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
+                        double(timing_->resident_bytes) / kMegabyte,
+                        double(timing_->peak_resident_bytes) / kMegabyte,
+                        double(s.memory_pool_bytes) / kMegabyte);
+  }
+  return text + fmt::format("\n{}   configuration {}   calibration {}\n", s.build, s.configuration_hash,
+                            s.calibration_hash);
+}
+
+}  // namespace farpoint::tools
