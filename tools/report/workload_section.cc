@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -103,6 +104,8 @@ std::string workload_section(const Runs& runs) {
     std::vector<std::string> row = {figure.name};
     std::vector<double> values;
     for (const RunRecord& run : runs) values.push_back(figure.value(run));
+    // Threaded runs do not time the parts of tracking and mapping.
+    if (std::none_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) continue;
     for (const double value : values) row.push_back(number(value, value < 10.0 ? 2 : 1));
     for (std::size_t i = 1; i < values.size(); ++i) row.push_back(ratio_text(values[i] / values[0]));
     rows.push_back(row);
