@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "slam/map/predict.h"
+#include "slam/mapping/forgetting.h"
 #include "slam/mapping/measurement.h"
 
 namespace farpoint::slam {
@@ -22,11 +23,6 @@ constexpr std::size_t kViewNeighbours = 30, kViewSecondRing = 10, kViewSecondNei
 // Views in somebody's hands at once: the one tracking has, a quick and a full one on their way to it, one
 // that frames are posed against, and the one being made.
 constexpr std::size_t kViews = 5;
-
-// Of a homogeneous world point; 0 at infinity.
-double inverse_distance_from(const Eigen::Vector3d& place_w, const Eigen::Vector4d& point_w) {
-  return point_w[3] / std::max((point_w.head<3>() - point_w[3] * place_w).norm(), 1e-9);
-}
 
 // All measurements of a landmark are of its one host patch, and share what is wrong with it: noise in its
 // pixels, a surface that is not as flat as it was taken for. That part, so large (1 sigma), does not average
@@ -182,7 +178,8 @@ void Mapper::cull_recent_landmarks() {
 std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) {
   SE3 T_world_reference;
   if (!map_.pose_of(request.reference_id, &T_world_reference)) return nullptr;
-  if (map_.keyframes().full()) limit_memory(newest_);
+  if (map_.keyframes().full())
+    limit_memory(config_.capacity.window_images, newest_, newest_id_, &map_, &counts_);
   const KeyframeHandle keyframe =
       make_keyframe(*request.frame, T_world_reference * request.T_reference_body, request.map_id);
   if (keyframe.is_null()) return nullptr;
@@ -224,8 +221,9 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   // What bends the map would bend the calibration too.
   if (config_.calibration.refine && consistent()) refine_calibration();
   const StageSpan span(listener_, Stage::kCulling);
-  cull_keyframes(newest_);
-  limit_memory(newest_);
+  cull_redundant_keyframes(neighbours(newest_, static_cast<std::size_t>(config_.mapping.window_keyframes)),
+                           newest_id_, &map_, &counts_);
+  limit_memory(config_.capacity.window_images, newest_, newest_id_, &map_, &counts_);
   map_.update_covisibility(newest_);
   count_virtual_points();
   return make_view(newest_);
@@ -509,77 +507,10 @@ bool Mapper::consistent() const {
   return sum < kConsistent * static_cast<double>(problem_.measurements.size());
 }
 
-// -------------------------------------------------------------------------------------------------------
-// forgetting
-
-void Mapper::cull_keyframes(KeyframeHandle newest) {
-  // Redundant: nine tenths of what it sees, three others see at least as finely. Landmarks count by their
-  // inverse depth: distant ones are seen by all keyframes around, and would make those redundant that alone
-  // saw the near ones, which hold the translation.
-  constexpr double kRedundant = 0.9;
-  constexpr int kOthers = 3;
-  constexpr std::uint64_t kKeepNewest = 3;
-  for (const KeyframeHandle& h :
-       neighbours(newest, static_cast<std::size_t>(config_.mapping.window_keyframes))) {
-    const Keyframe& k = map_.keyframes()[h];
-    if (k.id + kKeepNewest > newest_id_) continue;
-    double all = 0.0, redundant = 0.0;
-    for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
-      const Landmark* l = map_.landmarks().get(k.landmarks[i]);
-      if (l == nullptr || l->state == LandmarkState::kBearing) continue;
-      const double inverse_distance = inverse_distance_from(k.T_world_body.t, map_.world_point(*l));
-      all += inverse_distance;
-      int others = 0;
-      for (const Observation& o : l->observations) {
-        if (o.keyframe == h) continue;
-        const Keyframe& other = map_.keyframes()[o.keyframe];
-        if (other.set.features[static_cast<std::size_t>(o.feature)].level <= k.set.features[i].level + 1)
-          ++others;
-        if (others >= kOthers) break;
-      }
-      if (others >= kOthers) redundant += inverse_distance;
-    }
-    if (all <= 0.0 || redundant <= kRedundant * all) continue;
-    map_.remove_keyframe(h);
-    ++counts_.keyframes_culled;
-  }
-}
-
 void Mapper::retire_map(std::int32_t map_id) {
   map_.keyframes().for_each([map_id](KeyframeHandle, Keyframe& k) {
     if (k.map_id == map_id) k.image.reset();
   });
-}
-
-void Mapper::limit_memory(KeyframeHandle newest) {
-  // Pixels stay with the newest keyframes only.
-  const auto images = static_cast<std::uint64_t>(config_.capacity.window_images);
-  std::vector<KeyframeHandle> alive;
-  map_.keyframes().for_each([&](KeyframeHandle h, const Keyframe&) { alive.push_back(h); });
-  std::sort(alive.begin(), alive.end(), [this](KeyframeHandle a, KeyframeHandle b) {
-    return map_.keyframes()[a].id > map_.keyframes()[b].id;
-  });
-  for (std::size_t i = images; i < alive.size(); ++i) map_.keyframes()[alive[i]].image.reset();
-  // A full map forgets its oldest keyframe.
-  while (map_.keyframes().full() && !alive.empty()) {
-    if (alive.back() == newest) break;
-    map_.remove_keyframe(alive.back());
-    ++counts_.keyframes_culled;
-    alive.pop_back();
-  }
-  // A full landmark pool: the oldest keyframes' landmarks go with them.
-  while (map_.landmarks().size() > map_.landmarks().capacity() * 9 / 10 && alive.size() > 1) {
-    const KeyframeHandle oldest = alive.back();
-    const std::vector<LandmarkHandle> seen = map_.keyframes()[oldest].landmarks;
-    for (const LandmarkHandle& h : seen) {
-      const Landmark* l = map_.landmarks().get(h);
-      if (l != nullptr && l->last_seen_keyframe + images < newest_id_)
-        map_.remove_landmark(h), ++counts_.landmarks_culled;
-    }
-    map_.remove_keyframe(oldest);
-    ++counts_.keyframes_culled;
-    alive.pop_back();
-  }
 }
 
 // -------------------------------------------------------------------------------------------------------------

@@ -67,8 +67,6 @@ class Mapper {
   void update_settling(double scale_change);
   [[nodiscard]] bool consistent() const;
 
-  void cull_keyframes(KeyframeHandle newest);
-  void limit_memory(KeyframeHandle newest);
   // From the pool; null where all views are in somebody's hands.
   std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);
 

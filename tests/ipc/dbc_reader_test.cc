@@ -23,9 +23,9 @@ constexpr const char* kText =
     "BO_ 292 Other: 4 ABS\n"
     " SG_ FrontLeft : 0|8@1- (1,-3) [0|0] \"\"  Vector__XXX\n";
 
-class Dbc : public testing::Test {
+class DbcText : public testing::Test {
  protected:
-  Dbc() : path_(scratch_.path("a.dbc")) { std::ofstream(path_) << kText; }
+  DbcText() : path_(scratch_.path("a.dbc")) { std::ofstream(path_) << kText; }
   [[nodiscard]] std::string complaint(const std::string& message, const std::string& signal) const {
     try {
       (void)read_dbc_signal(path_, message, signal);
@@ -38,7 +38,7 @@ class Dbc : public testing::Test {
   const std::string path_;
 };
 
-TEST_F(Dbc, MotorolaAndIntel) {
+TEST_F(DbcText, MotorolaAndIntel) {
   // 0x1234 = 4660: 46.6 km/h. Motorola from bit 7: bytes 0 and 1 as written; Intel: low byte first.
   const CanFrame frame{291, 8, {0x12, 0x34, 0x34, 0x12, 0, 0, 0, 0}};
   const DbcSignal left = read_dbc_signal(path_, "Wheels", "FrontLeft");
@@ -47,27 +47,27 @@ TEST_F(Dbc, MotorolaAndIntel) {
   EXPECT_NEAR(read_dbc_signal(path_, "Wheels", "FrontRight").value(frame), 46.60, 1e-9);
 }
 
-TEST_F(Dbc, SignedMotorolaAcrossBytes) {
+TEST_F(DbcText, SignedMotorolaAcrossBytes) {
   // Twelve bits from bit 39 (byte 4, bit 7): byte 4 and the upper half of byte 5. -5 = 0xFFB.
   const DbcSignal yaw = read_dbc_signal(path_, "Wheels", "YawRate");
   EXPECT_NEAR(yaw.value({291, 8, {0, 0, 0, 0, 0xFF, 0xB0, 0, 0}}), -0.5, 1e-9);
   EXPECT_NEAR(yaw.value({291, 8, {0, 0, 0, 0, 0x01, 0x2F, 0, 0}}), 1.8, 1e-9);
 }
 
-TEST_F(Dbc, OfTwoSignalsOfANameThatOfTheMessage) {
+TEST_F(DbcText, OfTwoSignalsOfANameThatOfTheMessage) {
   const DbcSignal other = read_dbc_signal(path_, "Other", "FrontLeft");
   EXPECT_EQ(other.id, 292U);
   EXPECT_NEAR(other.value({292, 4, {0xFF}}), -4.0, 1e-9);
 }
 
-TEST_F(Dbc, WhatIsNoValueIsNaN) {
+TEST_F(DbcText, WhatIsNoValueIsNaN) {
   const DbcSignal left = read_dbc_signal(path_, "Wheels", "FrontLeft");
   EXPECT_TRUE(std::isnan(left.value({290, 8, {}})));            // another frame
   EXPECT_TRUE(std::isnan(left.value({291, 4, {}})));            // cut off
   EXPECT_TRUE(std::isnan(left.value({291, 8, {0xFF, 0xFF}})));  // beyond the range: not available
 }
 
-TEST_F(Dbc, MistakesAreNamed) {
+TEST_F(DbcText, MistakesAreNamed) {
   EXPECT_EQ(complaint("Nowhere", "X"), path_ + ": no message Nowhere, expected MESSAGE.SIGNAL of this file");
   EXPECT_EQ(complaint("Wheels", "Nothing"),
             path_ + ": message Wheels has no signal Nothing, expected MESSAGE.SIGNAL of this file");
@@ -78,7 +78,7 @@ TEST_F(Dbc, MistakesAreNamed) {
 }
 
 // The shipped file describes our own frames: its signals can be read too.
-TEST(DbcFile, ReadsTheShippedOne) {
+TEST(DbcShipped, IsRead) {
   const DbcSignal age =
       read_dbc_signal(std::string(FARPOINT_SOURCE_DIR) + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");
   EXPECT_EQ(age.id, 0x300U);

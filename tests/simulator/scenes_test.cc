@@ -202,7 +202,6 @@ TEST(Sigma, DepthErrorsAreWhatIsClaimed) {
 TEST(Modes, VirtualPointsReachFurther) {
   for (const char* name : {"straight", "hovering"}) {
     const Scene scene = shortened(name, name[0] == 's' ? 150 : 600);
-    double squares[2] = {0, 0};
     double depth_ratios = 0;
     constexpr int kSeeds = 3;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -224,11 +223,13 @@ TEST(Modes, VirtualPointsReachFurther) {
             << name << ", seed " << seed;
       }
       EXPECT_GT(vmp.vmp_share(), 0.05) << name << ", seed " << seed;
-      squares[0] += baseline.ate_m * baseline.ate_m, squares[1] += vmp.ate_m * vmp.ate_m;
+      // Which mode is the more accurate takes 20 seeds to tell (sim_compare; one pair differs by half either
+      // way). Neither may be off by more than a thousandth of the way.
+      EXPECT_LT(baseline.ate_m, 0.001 * baseline.path_m) << name << ", seed " << seed;
+      EXPECT_LT(vmp.ate_m, 0.001 * vmp.path_m) << name << ", seed " << seed;
     }
     // Seen over 20 seeds: 1.34 on the straight (quartiles 1.33 to 1.36), 1.07 for the drone (1.05 to 1.08).
     EXPECT_GT(depth_ratios, scene.motion == Motion::kVehicle ? 1.15 : 1.02) << name;
-    EXPECT_LT(std::sqrt(squares[1] / squares[0]), 1.3) << name;
   }
 }
 

@@ -1,0 +1,22 @@
+// What the map forgets: keyframes that say nothing new, and the oldest where memory ends.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "slam/map/map.h"
+#include "slam/mapping/statistics.h"
+
+namespace farpoint::slam {
+
+// Removes those of the candidates that are redundant: nine tenths of what they see, three other keyframes see
+// at least as finely. The newest few stay.
+void cull_redundant_keyframes(const std::vector<KeyframeHandle>& candidates, std::uint64_t newest_id,
+                              Map* map, MappingCounts* counts);
+
+// Takes the pixels from all but the newest `images` keyframes; removes the oldest keyframes (never `newest`)
+// where a pool is full, and landmarks that only they saw.
+void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Map* map,
+                  MappingCounts* counts);
+
+}  // namespace farpoint::slam
