@@ -73,8 +73,7 @@ void expect_no_heap_calls(const std::string& recording, double speed) {
   EXPECT_EQ(status, 0);
   EXPECT_TRUE(watched);
   std::uint64_t calls = 0;
-  for (const char* name :
-       {Pipeline::kCaptureThread, Pipeline::kTrackingThread, Pipeline::kOutputThread}) {
+  for (const char* name : {Pipeline::kCaptureThread, Pipeline::kTrackingThread, Pipeline::kOutputThread}) {
     EXPECT_EQ(test::heap_calls(name), 0U) << name;
     calls += test::heap_calls(name);
   }

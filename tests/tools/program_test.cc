@@ -27,9 +27,9 @@ void expect_misuse(const std::string& arguments, const std::string& part) {
 }
 
 TEST(Program, HelpTeaches) {
-  for (const char* arguments : {"--help", "import --help", "import kitti --help", "import euroc --help",
-                                "import tum --help", "export --help", "evaluate --help", "bench --help",
-                                "ctl --help", "top --help"}) {
+  for (const char* arguments :
+       {"--help", "import --help", "import kitti --help", "import euroc --help", "import tum --help",
+        "export --help", "evaluate --help", "bench --help", "ctl --help", "top --help"}) {
     const ProgramResult result = run_farpoint_program(arguments);
     EXPECT_EQ(result.status, 0) << arguments;
     EXPECT_EQ(result.err, "") << arguments;
