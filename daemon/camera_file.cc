@@ -1,5 +1,6 @@
 #include "daemon/camera_file.h"
 
+#include "daemon/calibration_message.h"
 #include "daemon/errors.h"
 #include "daemon/yaml_file.h"
 
@@ -66,29 +67,11 @@ CameraFile parse_camera_file(const std::string& content, const std::filesystem::
 }
 
 calibration_t calibration_of(const CameraFile& camera, const std::string& name) {
-  const slam::Camera::Parameters& p = camera.parameters;
-  camera_calibration_t c{};
-  c.name = name;
-  c.model = p.model == slam::CameraModel::kKannalaBrandt ? "kannala-brandt" : "pinhole-radtan";
-  c.width = p.width_px;
-  c.height = p.height_px;
-  c.fx = p.fx_px;
-  c.fy = p.fy_px;
-  c.cx = p.cx_px;
-  c.cy = p.cy_px;
-  std::copy(p.distortion.begin(), p.distortion.end(), c.distortion);
-  const slam::SE3 T = camera.T_body_camera.value_or(forward_looking());
-  std::copy(T.t.data(), T.t.data() + 3, c.position);
-  c.orientation[0] = T.q.w();
-  c.orientation[1] = T.q.x();
-  c.orientation[2] = T.q.y();
-  c.orientation[3] = T.q.z();
-  c.rate_hz = camera.rate_hz;
-  c.row_time_s = camera.row_time_s;
   calibration_t message{};
   message.body_name = camera.T_body_camera ? "body" : "";
   message.ncameras = 1;
-  message.cameras = {c};
+  message.cameras = {camera_message(name, camera.parameters, camera.T_body_camera.value_or(forward_looking()),
+                                    camera.rate_hz, camera.row_time_s)};
   message.imu_orientation[0] = 1.0;
   return message;
 }

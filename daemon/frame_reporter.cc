@@ -29,7 +29,8 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   const slam::FrameResult& result = package->result;
   {
     const StageScope scope(&package->clock, timing_t::STAGE_OUTPUT);
-    frame_ = make_frame_output(since_odom_reset(result), assumed_scale_);
+    silence_.result = since_odom_reset(result);
+    frame_ = make_frame_output(silence_.result, assumed_scale_);
     frame_.age_us = package->chance.age_us;
     ++status_.frames_tracked;
     if (frame_.valid) ++status_.frames_valid;
@@ -40,7 +41,6 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     if (with_schedule_) publish_schedule(*package);
   }
   note_state(frame_.result);
-  silence_.result = since_odom_reset(result);
   silence_.counts = package->counts;
   silence_.chance = package->chance;
   if (publisher_->has_sinks()) {

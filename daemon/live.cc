@@ -15,7 +15,6 @@
 #include "daemon/logging.h"
 #include "daemon/outputs.h"
 #include "daemon/recorder.h"
-#include "daemon/rig.h"
 #include "daemon/service_manager.h"
 #include "daemon/session.h"
 #include "daemon/stop_signal.h"
@@ -100,7 +99,7 @@ class LiveRun {
   int run(const std::function<Config()>& reload, const ThreadHooks& hooks);
 
  private:
-  [[nodiscard]] std::unique_ptr<Session> make_session();
+  [[nodiscard]] std::unique_ptr<Session> open_session();
   [[nodiscard]] PipelineOptions pipeline_options();
   [[nodiscard]] bool wants_results() const {
     return !options_.output.empty() || !options_.trajectory.empty();
@@ -138,7 +137,7 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
       calibration_(read_calibration(config)),
       outputs_(options, config, Outputs::Use::kLive),
       source_(camera ? std::move(camera) : make_camera(config, calibration_)),
-      session_(make_session()),
+      session_(open_session()),
       realtime_(config.realtime),
       pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
   open_control();
@@ -151,19 +150,10 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
   source_.record_to(&*recorder_);
 }
 
-std::unique_ptr<Session> LiveRun::make_session() {
-  try {
-    const slam::Rig rig = make_rig(calibration_, config_.camera.index);
-    spdlog::info("farpointd {}, configuration {:016x}, live from {}", build_text(), config_hash(config_),
-                 config_.camera.device);
-    return std::make_unique<Session>(config_, rig, calibration_hash(calibration_), outputs_.sinks(),
-                                     outputs_.publisher(), !options_.output.empty());
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(std::string("configuration: ") + error.what());
-  } catch (const std::bad_alloc&) {
-    throw ConfigError(
-        "configuration: not enough memory for the keys of section capacity, expected smaller ones");
-  }
+std::unique_ptr<Session> LiveRun::open_session() {
+  spdlog::info("farpointd {}, configuration {:016x}, live from {}", build_text(), config_hash(config_),
+               config_.camera.device);
+  return make_session(config_, calibration_, &outputs_, !options_.output.empty());
 }
 
 void LiveRun::open_control() {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "daemon/calibration_message.h"
+
 namespace farpoint::daemon {
 namespace {
 
@@ -13,22 +15,6 @@ constexpr double kCountedRelativeSigma = 0.30;
 constexpr int kQuantiles = 101;
 // The estimator gives keyframe poses without their times.
 constexpr std::int64_t kUnknownUtime = -1;
-
-void set_position(const Eigen::Vector3d& t, double* position) {
-  std::copy(t.data(), t.data() + 3, position);
-}
-
-void set_orientation(const Eigen::Quaterniond& q, double* orientation) {
-  orientation[0] = q.w();
-  orientation[1] = q.x();
-  orientation[2] = q.y();
-  orientation[3] = q.z();
-}
-
-void set_pose(const slam::SE3& T, double* position, double* orientation) {
-  set_position(T.t, position);
-  set_orientation(T.q, orientation);
-}
 
 // The estimate as it may be told: NaN where there is none.
 slam::SE3 known(bool has_pose, const slam::SE3& T) {
@@ -121,8 +107,8 @@ odometry_t make_odometry(const FrameOutput& frame) {
   m.sequence = r.sequence;
   set_pose(known(r.has_pose, r.T_odom_body), m.position, m.orientation);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNan);
-  set_position(frame.valid ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
-  set_position(frame.valid ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
+  set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
+  set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
   // The odom frame holds the body's last motion, not its place: the map pose's covariance bounds it from
   // above, and is given while the estimator has none of its own for odom.
   set_matrix(frame.valid ? r.covariance : slam::Matrix6d::Constant(kNan), m.pose_covariance);
@@ -165,8 +151,8 @@ map_from_odom_t make_map_from_odom(const FrameOutput& frame) {
   map_from_odom_t m{};
   m.utime = r.utime;
   m.map_id = r.map_id;
-  set_position(r.map_from_odom.t, m.position);
-  set_orientation(r.map_from_odom.q, m.orientation);
+  set_vector(r.map_from_odom.t, m.position);
+  set_quaternion(r.map_from_odom.q, m.orientation);
   m.scale = r.map_from_odom.scale;
   m.scale_state = static_cast<std::int8_t>(r.scale);
   m.reset_counter = static_cast<std::int32_t>(r.reset_counter);
@@ -178,8 +164,8 @@ bot_core::pose_t make_bot_core_pose(const FrameOutput& frame) {
   bot_core::pose_t m{};
   m.utime = r.utime;
   set_pose(r.T_map_body, m.pos, m.orientation);
-  set_position(r.T_map_body.q * r.velocity_body.head<3>(), m.vel);
-  set_position(r.velocity_body.tail<3>(), m.rotation_rate);
+  set_vector(r.T_map_body.q * r.velocity_body.head<3>(), m.vel);
+  set_vector(r.velocity_body.tail<3>(), m.rotation_rate);
   return m;
 }
 
@@ -243,7 +229,7 @@ trajectory_t make_trajectory(const RunEnd& end) {
   return m;
 }
 
-landmarks_t make_landmarks(const RunEnd& end) {
+landmarks_t make_landmarks(const RunEnd& end, const SightingsOfLandmarks& sightings) {
   landmarks_t m{};
   m.utime = end.utime;
   m.scale_state = static_cast<std::int8_t>(end.last.scale);
@@ -255,14 +241,14 @@ landmarks_t make_landmarks(const RunEnd& end) {
     l.anchor_utime = info.anchor_utime;
     l.anchor_camera = info.anchor_camera;
     for (int i = 0; i < 2; ++i) l.anchor_pixel[i] = static_cast<float>(info.anchor_pixel[i]);
-    set_position(info.anchor_map * end.unit_scale, l.anchor_position);
-    set_position(info.position_map * end.unit_scale, l.position);
+    set_vector(info.anchor_map * end.unit_scale, l.anchor_position);
+    set_vector(info.position_map * end.unit_scale, l.position);
     l.distance = end.unit_scale / info.inverse_depth;
     l.relative_sigma = static_cast<float>(info.inverse_depth_sigma / info.inverse_depth);
     l.created_utime = info.created_utime;
     l.creation_depth = static_cast<float>(info.creation_depth * end.unit_scale);
     l.creation_relative_sigma = static_cast<float>(info.creation_relative_sigma);
-    if (const auto seen = end.sightings.find(info.id); seen != end.sightings.end()) {
+    if (const auto seen = sightings.find(info.id); seen != sightings.end()) {
       for (const Sighting& s : seen->second) {
         l.sighting_utime.push_back(s.utime);
         l.sighting_u.push_back(s.pixel.x());

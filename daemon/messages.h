@@ -36,6 +36,8 @@ struct Sighting {
   std::int64_t utime = 0;
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
 };
+using SightingsOfLandmarks =
+    std::unordered_map<std::uint64_t, std::vector<Sighting>>;  // by the landmark's id
 
 // Everything the end of a run is summarised from.
 struct RunEnd {
@@ -43,16 +45,15 @@ struct RunEnd {
   slam::FrameResult last;   // with scale.assumed applied
   std::int64_t frames = 0;  // of the recording, posed or not
   std::int64_t frames_valid = 0;
-  std::vector<std::int64_t> live_utimes;                               // of valid frames, ascending
-  std::vector<slam::MapTrajectory> trajectories;                       // most frames first
-  std::vector<slam::LandmarkInfo> landmarks;                           // alive, of all maps
-  std::unordered_map<std::uint64_t, std::vector<Sighting>> sightings;  // of each landmark, by its id
-  std::vector<std::vector<double>> observation_distances;              // of each map of `trajectories`
+  std::vector<std::int64_t> live_utimes;                   // of valid frames, ascending
+  std::vector<slam::MapTrajectory> trajectories;           // most frames first
+  std::vector<slam::LandmarkInfo> landmarks;               // alive, of all maps
+  std::vector<std::vector<double>> observation_distances;  // of each map of `trajectories`
   slam::EstimatorCounts counts;
   double unit_scale = 1.0;  // published units a map unit
 };
 [[nodiscard]] trajectory_t make_trajectory(const RunEnd& end);
-[[nodiscard]] landmarks_t make_landmarks(const RunEnd& end);
+[[nodiscard]] landmarks_t make_landmarks(const RunEnd& end, const SightingsOfLandmarks& sightings);
 // Counts of refused input, configuration, build and hashes are the caller's to fill.
 [[nodiscard]] summary_t make_summary(const RunEnd& end, const Config& config);
 

@@ -1,5 +1,7 @@
 #include "daemon/publisher.h"
 
+#include <algorithm>
+
 namespace farpoint::daemon {
 
 void Publisher::on_frame(const FrameOutput& frame) {
@@ -8,6 +10,10 @@ void Publisher::on_frame(const FrameOutput& frame) {
   publish(ipc::kPoseChannel, utime, make_pose(frame));
   publish(ipc::kMapFromOdomChannel, utime, make_map_from_odom(frame));
   if (frame.valid) publish(ipc::kBotCorePoseChannel, utime, make_bot_core_pose(frame));
+}
+
+bool Publisher::has_logs() const {
+  return std::any_of(sinks_.begin(), sinks_.end(), [](const auto& sink) { return sink->is_log(); });
 }
 
 std::uint64_t Publisher::errors(bool of_logs) const {

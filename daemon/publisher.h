@@ -18,6 +18,7 @@ class Publisher final : public PoseSink {
   Publisher() { bytes_.reserve(std::size_t{1} << 16); }
   void add(std::unique_ptr<MessageSink> sink) { sinks_.push_back(std::move(sink)); }
   [[nodiscard]] bool has_sinks() const { return !sinks_.empty(); }
+  [[nodiscard]] bool has_logs() const;
 
   // FARPOINT_ODOMETRY first: it is what a controller waits for. Then POSE, MAP_FROM_ODOM and the viewers'
   // pose.
@@ -36,6 +37,7 @@ class Publisher final : public PoseSink {
   // Results of a whole run: into logs only.
   template <typename Message>
   void publish_result(const char* channel, std::int64_t utime, const Message& message) {
+    if (!has_logs()) return;
     ipc::encode(message, &bytes_);
     for (const auto& sink : sinks_) {
       if (sink->is_log()) sink->send(channel, utime, bytes_);

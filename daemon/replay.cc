@@ -6,13 +6,13 @@
 #include <optional>
 
 #include "daemon/build_info.h"
+#include "daemon/errors.h"
 #include "daemon/last_line.h"
 #include "daemon/log_frame_source.h"
 #include "daemon/logging.h"
 #include "daemon/outputs.h"
 #include "daemon/paced_source.h"
 #include "daemon/pipeline.h"
-#include "daemon/rig.h"
 #include "daemon/schedule.h"
 #include "daemon/session.h"
 #include "daemon/stop_signal.h"
@@ -20,21 +20,14 @@
 namespace farpoint::daemon {
 namespace {
 
-std::unique_ptr<Session> make_session(const Config& config, const LogFrameSource& source, Outputs* outputs,
-                                      const char* how, bool with_schedule) {
+std::unique_ptr<Session> session_of(const Config& config, const LogFrameSource& source, Outputs* outputs,
+                                    const char* how, bool with_schedule) {
+  spdlog::info("farpointd {}, configuration {:016x}, {} replay of {}", build_text(), config_hash(config), how,
+               source.name());
   try {
-    const slam::Rig rig = make_rig(source.calibration(), config.camera.index);
-    spdlog::info("farpointd {}, configuration {:016x}, {} replay of {}", build_text(), config_hash(config),
-                 how, source.name());
-    return std::make_unique<Session>(config, rig, calibration_hash(source.calibration()), outputs->sinks(),
-                                     outputs->publisher(), with_schedule);
+    return make_session(config, source.calibration(), outputs, with_schedule);
   } catch (const InputError& error) {
     throw InputError(source.name() + ": " + error.what());
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(std::string("configuration: ") + error.what());
-  } catch (const std::bad_alloc&) {
-    throw ConfigError(
-        "configuration: not enough memory for the keys of section capacity, expected smaller ones");
   }
 }
 
@@ -71,8 +64,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
   while (source.next(&frame, &clock)) {
     StopOnSignal::check();
     if (!session) {
-      session =
-          make_session(config, source, &outputs, schedule ? "recorded" : "lockstep", schedule != nullptr);
+      session = session_of(config, source, &outputs, schedule ? "recorded" : "lockstep", schedule != nullptr);
     }
     const RecordedChance* recorded = nullptr;
     if (schedule != nullptr && (recorded = schedule->take(frame.utime)) == nullptr) {
@@ -100,7 +92,7 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   StageClock clock;
   SourceFrame first;
   if (!source.next(&first, &clock)) throw InputError(source.name() + ": no image");
-  const std::unique_ptr<Session> session = make_session(config, source, &outputs, "threaded", true);
+  const std::unique_ptr<Session> session = session_of(config, source, &outputs, "threaded", true);
   PacedSource paced(&source, first, *options.speed);
   RealtimeReport realtime(config.realtime);
   realtime.lock_memory();

@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "daemon/build_info.h"
+#include "daemon/errors.h"
+#include "daemon/outputs.h"
+#include "daemon/rig.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -93,10 +96,12 @@ const RunEnd& Session::finish(const InputCounts& in) {
       if (end_.trajectories[i].map_id == map_id) end_.observation_distances[i].push_back(distance);
     }
   });
-  estimator_.visit_sightings([&](std::uint64_t id, std::int64_t utime, const Eigen::Vector2f& pixel) {
-    end_.sightings[id].push_back({utime, pixel});
-  });
-  publisher_->publish_result(ipc::kLandmarksChannel, end_.utime, make_landmarks(end_));
+  if (publisher_->has_logs()) publish_results(in);
+  return end_;
+}
+
+void Session::publish_results(const InputCounts& in) {
+  publish_landmarks();
   publisher_->publish_result(ipc::kTrajectoryChannel, end_.utime, make_trajectory(end_));
   summary_t summary = make_summary(end_, config_);
   summary.times_backwards = in.times_backwards;
@@ -108,7 +113,28 @@ const RunEnd& Session::finish(const InputCounts& in) {
   summary.calibration_hash = names_.calibration_hash;
   summary.build = names_.build;
   publisher_->publish_result(ipc::kSummaryChannel, end_.utime, summary);
-  return end_;
+}
+
+void Session::publish_landmarks() {
+  SightingsOfLandmarks sightings;
+  estimator_.visit_sightings([&](std::uint64_t id, std::int64_t utime, const Eigen::Vector2f& pixel) {
+    sightings[id].push_back({utime, pixel});
+  });
+  publisher_->publish_result(ipc::kLandmarksChannel, end_.utime, make_landmarks(end_, sightings));
+}
+
+std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
+                                      Outputs* outputs, bool with_schedule) {
+  const slam::Rig rig = make_rig(calibration, config.camera.index);
+  try {
+    return std::make_unique<Session>(config, rig, calibration_hash(calibration), outputs->sinks(),
+                                     outputs->publisher(), with_schedule);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("configuration: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw ConfigError(
+        "configuration: not enough memory for the keys of section capacity, expected smaller ones");
+  }
 }
 
 }  // namespace farpoint::daemon

@@ -16,6 +16,8 @@
 
 namespace farpoint::daemon {
 
+class Outputs;
+
 // One frame of a threaded run, to be repeated.
 struct RecordedChance {
   FrameChance chance;
@@ -48,6 +50,9 @@ class Session {
   [[nodiscard]] std::size_t pool_bytes() const { return pool_bytes_; }
 
  private:
+  void publish_results(const InputCounts& in);
+  void publish_landmarks();
+
   Config config_;
   FrameReporter::Names names_;
   slam::Estimator estimator_;
@@ -58,5 +63,10 @@ class Session {
   FramePackage package_;  // of process()
   RunEnd end_;
 };
+
+// A session for the rig of `calibration` (see the constructor). Throws InputError where the calibration
+// cannot be used, ConfigError where the configuration cannot or wants more memory than there is.
+[[nodiscard]] std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
+                                                    Outputs* outputs, bool with_schedule);
 
 }  // namespace farpoint::daemon

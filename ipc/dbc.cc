@@ -8,7 +8,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <string_view>
 
@@ -85,8 +84,8 @@ bool read_layout(Scanner s, DbcSignal* d) {
   return true;
 }
 
-// The bit of the frame that holds bit i of the value, 0 the least significant; nothing where it lies outside.
-std::optional<unsigned> position_of(const DbcSignal& d, unsigned i) {
+// The bit of the frame that holds bit i of the value, 0 the least significant.
+unsigned position_of(const DbcSignal& d, unsigned i) {
   if (!d.is_motorola) return d.start + i;
   // Motorola: from the most significant bit on, downwards within a byte, then on with the next byte's bit 7.
   const unsigned from_top = d.length - 1 - i;
@@ -97,7 +96,7 @@ std::optional<unsigned> position_of(const DbcSignal& d, unsigned i) {
 bool fits(const DbcSignal& d) {
   if (d.length == 0 || d.length > 64 || d.size == 0 || d.size > 8 || d.start >= 8 * d.size) return false;
   for (unsigned i = 0; i < d.length; ++i)
-    if (position_of(d, i).value_or(64) >= 8 * d.size) return false;
+    if (position_of(d, i) >= 8 * d.size) return false;
   return true;
 }
 
@@ -107,7 +106,7 @@ double DbcSignal::value(const CanFrame& frame) const {
   if (frame.id != id || frame.size < size) return kNan;
   std::uint64_t raw = 0;
   for (unsigned i = 0; i < length; ++i) {
-    const unsigned bit = *position_of(*this, i);
+    const unsigned bit = position_of(*this, i);
     if ((frame.data.at(bit / 8) >> (bit % 8) & 1) != 0) raw |= std::uint64_t{1} << i;
   }
   double number = static_cast<double>(raw);

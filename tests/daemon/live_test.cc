@@ -21,6 +21,7 @@
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tests/daemon/synthetic_log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 
 namespace farpoint::daemon {
@@ -165,17 +166,6 @@ TEST_F(Live, StopsInOrderWithinASecond) {
   EXPECT_LT(last_seen_.age_us, 1'000'000);
 }
 
-std::vector<std::string> events_of(const std::string& path) {
-  std::vector<std::string> events;
-  ipc::LogReader reader(path);
-  ipc::LogEvent event;
-  while (reader.next(&event)) {
-    if (event.channel == ipc::kTimingChannel) continue;
-    events.push_back(std::string(event.channel) + ' ' + std::string(event.data.begin(), event.data.end()));
-  }
-  return events;
-}
-
 TEST_F(Live, WhatWasRecordedReplaysToTheSamePoses) {
   options_.record = scratch_.path("run.lcm");
   options_.output = scratch_.path("out.lcm");
@@ -195,7 +185,7 @@ TEST_F(Live, WhatWasRecordedReplaysToTheSamePoses) {
   EXPECT_GT(poses.size(), 500U);  // it did track
   EXPECT_TRUE(poses == test::read_bytes(again.live_trajectory));
   // Pose messages hold no measured time but the age, which the schedule carries.
-  const auto before = events_of(options_.output), after = events_of(again.output);
+  const auto before = test::events_of(options_.output), after = test::events_of(again.output);
   int poses_compared = 0;
   for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i) {
     if (!before[i].starts_with(ipc::kOdometryChannel)) continue;

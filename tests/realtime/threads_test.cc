@@ -9,6 +9,7 @@
 
 #include "daemon/replay.h"
 #include "ipc/log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 #include "tests/realtime/heap_watch.h"
 
@@ -108,19 +109,6 @@ TEST(RecordedThreads, APlantedMallocIsFound) {
   EXPECT_EQ(test::heap_calls(Pipeline::kOutputThread), 0U);
 }
 
-// Every event of a log but those that hold measured times.
-std::vector<std::string> events_of(const std::string& path) {
-  std::vector<std::string> events;
-  ipc::LogReader reader(path);
-  ipc::LogEvent event;
-  while (reader.next(&event)) {
-    if (event.channel == ipc::kTimingChannel) continue;
-    events.push_back(std::string(event.channel) + ' ' + std::to_string(event.timestamp_us) + ' ' +
-                     std::string(event.data.begin(), event.data.end()));
-  }
-  return events;
-}
-
 void expect_same_file(const std::string& a, const std::string& b) {
   const auto left = test::read_bytes(a), right = test::read_bytes(b);
   EXPECT_FALSE(left.empty());
@@ -145,7 +133,7 @@ TEST(RecordedThreads, ARecordedScheduleRepeatsTheRun) {
   expect_same_file(live.trajectory, again.trajectory);
   expect_same_file(live.live_trajectory, again.live_trajectory);
   expect_same_file(live.can_log, again.can_log);
-  const auto before = events_of(live.output), after = events_of(again.output);
+  const auto before = test::events_of(live.output), after = test::events_of(again.output);
   ASSERT_EQ(before.size(), after.size());
   for (std::size_t i = 0; i < before.size(); ++i)
     ASSERT_TRUE(before[i] == after[i]) << "event " << i << ": " << before[i].substr(0, 40);

@@ -73,7 +73,7 @@ TEST(Top, WithoutAPoseNoNumbersAreShown) {
   o.position[0] = 99.0;
   board.take(o, 100.0);
   const std::string text = board.render(100.1, false);
-  EXPECT_TRUE(has(text, "NO CAMERA"));
+  EXPECT_TRUE(has(text, "NO_CAMERA"));
   EXPECT_TRUE(has(text, "no valid pose"));
   EXPECT_FALSE(has(text, "99.00"));
 }
@@ -81,7 +81,7 @@ TEST(Top, WithoutAPoseNoNumbersAreShown) {
 TEST(Top, EveryStateHasItsName) {
   EXPECT_STREQ(state_name(status_t::STATE_STARTING), "starting");
   EXPECT_STREQ(state_name(status_t::STATE_RELOCALISING), "relocalising");
-  EXPECT_STREQ(state_name(status_t::STATE_NO_CAMERA), "no camera");
+  EXPECT_STREQ(state_name(status_t::STATE_NO_CAMERA), "no_camera");
   EXPECT_STREQ(state_name(99), "?");
   EXPECT_STREQ(can_state_name(status_t::CAN_ABSENT), "absent");
   EXPECT_STREQ(can_state_name(-1), "?");

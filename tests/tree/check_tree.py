@@ -34,7 +34,8 @@ OPTIONS = "slam/config.h"
 STAGES = "slam/stages.h"
 SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set()}
 # The tools read camera files and refuse input as the daemon does, and speak with it.
-SHARED_WITH_TOOLS = {"daemon/errors.h", "daemon/yaml_file.h", "daemon/camera_file.h", "daemon/control_socket.h"}
+SHARED_WITH_TOOLS = {"daemon/errors.h", "daemon/yaml_file.h", "daemon/camera_file.h", "daemon/calibration_message.h",
+                     "daemon/control_socket.h"}
 SHARED_READERS = {"slam", "slam/map", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.
 FORBIDDEN_IN_SLAM = re.compile(

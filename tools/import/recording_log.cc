@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 
+#include "daemon/calibration_message.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"
@@ -38,48 +39,20 @@ std::vector<Event> events_in_order(const Recording& recording) {
   return events;
 }
 
-void set_vector(const Eigen::Vector3d& v, double* out) {
-  std::copy(v.data(), v.data() + 3, out);
-}
-
-void set_quaternion(const Eigen::Quaterniond& q, double* out) {
-  out[0] = q.w();
-  out[1] = q.x();
-  out[2] = q.y();
-  out[3] = q.z();
-}
-
-camera_calibration_t to_message(const RecordingCamera& camera) {
-  const slam::Camera::Parameters& p = camera.parameters;
-  camera_calibration_t message{};
-  message.name = camera.name;
-  message.model = p.model == slam::CameraModel::kKannalaBrandt ? "kannala-brandt" : "pinhole-radtan";
-  message.width = p.width_px;
-  message.height = p.height_px;
-  message.fx = p.fx_px;
-  message.fy = p.fy_px;
-  message.cx = p.cx_px;
-  message.cy = p.cy_px;
-  std::copy(p.distortion.begin(), p.distortion.end(), message.distortion);
-  set_vector(camera.T_body_camera.t, message.position);
-  set_quaternion(camera.T_body_camera.q, message.orientation);
-  message.rate_hz = camera.rate_hz;
-  message.row_time_s = camera.row_time_s;
-  return message;
-}
-
 calibration_t calibration_message(const Recording& recording, std::int64_t utime) {
   calibration_t message{};
   message.utime = utime;
   message.body_name = recording.body_name;
-  for (const RecordingCamera& camera : recording.cameras) message.cameras.push_back(to_message(camera));
+  for (const RecordingCamera& camera : recording.cameras) {
+    message.cameras.push_back(daemon::camera_message(camera.name, camera.parameters, camera.T_body_camera,
+                                                     camera.rate_hz, camera.row_time_s));
+  }
   message.ncameras = static_cast<std::int32_t>(message.cameras.size());
   message.imu_orientation[0] = 1.0;
   if (!recording.imu_calibration) return message;
   const ImuCalibration& imu = *recording.imu_calibration;
   message.has_imu = 1;
-  set_vector(imu.T_body_imu.t, message.imu_position);
-  set_quaternion(imu.T_body_imu.q, message.imu_orientation);
+  daemon::set_pose(imu.T_body_imu, message.imu_position, message.imu_orientation);
   message.imu_rate_hz = imu.rate_hz;
   message.gyro_noise_density = imu.gyro_noise_density;
   message.gyro_random_walk = imu.gyro_random_walk;
@@ -91,8 +64,8 @@ calibration_t calibration_message(const Recording& recording, std::int64_t utime
 imu_t to_message(const RecordingImu& sample) {
   imu_t message{};
   message.utime = sample.utime;
-  set_vector(sample.angular_velocity_radps, message.angular_velocity);
-  set_vector(sample.acceleration_mps2, message.acceleration);
+  daemon::set_vector(sample.angular_velocity_radps, message.angular_velocity);
+  daemon::set_vector(sample.acceleration_mps2, message.acceleration);
   message.temperature = std::numeric_limits<double>::quiet_NaN();
   return message;
 }
@@ -100,10 +73,10 @@ imu_t to_message(const RecordingImu& sample) {
 ground_truth_t to_message(const RecordingTruth& truth, bool has_orientation) {
   ground_truth_t message{};
   message.utime = truth.utime;
-  set_vector(truth.T_world_body.t, message.position);
+  daemon::set_vector(truth.T_world_body.t, message.position);
   message.has_orientation = has_orientation ? 1 : 0;
-  set_quaternion(has_orientation ? truth.T_world_body.q : Eigen::Quaterniond::Identity(),
-                 message.orientation);
+  daemon::set_quaternion(has_orientation ? truth.T_world_body.q : Eigen::Quaterniond::Identity(),
+                         message.orientation);
   return message;
 }
 

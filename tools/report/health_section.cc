@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "slam/estimator.h"
 #include "tools/report/html.h"
 #include "tools/report/plot.h"
 #include "tools/report/sections.h"
@@ -8,18 +9,14 @@
 namespace farpoint::tools::report {
 namespace {
 
-struct StateLook {
-  const char* name;
-  const char* fill;  // of falling lightness with falling health
-};
-constexpr std::array kStates = {StateLook{"starting", "#e8e8e8"},     StateLook{"initialising", "#d0d0d0"},
-                                StateLook{"settling", "#a9c7e8"},     StateLook{"tracking", "#5b92cf"},
-                                StateLook{"degraded", "#e6a14a"},     StateLook{"lost", "#a01010"},
-                                StateLook{"relocalising", "#7a3b8f"}, StateLook{"no camera", "#000000"}};
+// By slam::State, from what does not count (grey) over what does (blue) to what needs help: of falling
+// lightness with falling health.
+constexpr std::array kFills = {"#e8e8e8", "#d0d0d0", "#a9c7e8", "#5b92cf",
+                               "#e6a14a", "#a01010", "#7a3b8f", "#000000"};
 
-const StateLook& look_of(std::int8_t state) {
+const char* fill_of(std::int8_t state) {
   const auto i = static_cast<std::size_t>(std::max<int>(state, 0));
-  return kStates[std::min(i, kStates.size() - 1)];
+  return kFills[std::min(i, kFills.size() - 1)];
 }
 
 double end_of(const Runs& runs) {
@@ -56,7 +53,7 @@ void draw_states(const RunRecord& run, double top, double left, double px_per_s,
     const double from = run.frames[i].time_s - run.start_s;
     const double to = run.frames[std::min(end, run.frames.size() - 1)].time_s - run.start_s;
     svg->rectangle({left + px_per_s * from, top}, {std::max(px_per_s * (to - from), 1.0), 16},
-                   std::string("fill=\"") + look_of(run.frames[i].state).fill + "\"");
+                   std::string("fill=\"") + fill_of(run.frames[i].state) + "\"");
     i = end;
   }
 }
@@ -124,9 +121,9 @@ std::string time_line(const Runs& runs) {
     top += kStateRow_px + kLane_px * static_cast<double>(faults[i].size());
   }
   double x = kLeft_px - 60;
-  for (const StateLook& state : kStates) {
-    svg.rectangle({x, bottom + 40}, {14, 12}, std::string("fill=\"") + state.fill + "\" stroke=\"#333\"");
-    svg.text({x + 18, bottom + 50}, state.name, Anchor::kStart);
+  for (std::size_t i = 0; i < kFills.size(); ++i) {
+    svg.rectangle({x, bottom + 40}, {14, 12}, std::string("fill=\"") + kFills[i] + "\" stroke=\"#333\"");
+    svg.text({x + 18, bottom + 50}, slam::to_string(slam::State(i)), Anchor::kStart);
     x += 112;
   }
   return svg.finish("States and faults over time");

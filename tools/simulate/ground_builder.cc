@@ -58,11 +58,8 @@ void add_grid(const Site& site, const ChunkSite& chunk, const HeightGrid& grid, 
           const double slope =
               std::hypot(c.z() + b.z() - a.z() - d.z(), c.z() + d.z() - a.z() - b.z()) / (2.0 * grid.step_m);
           const Eigen::Vector3d middle = 0.25 * (a + b + c + d) + chunk.origin;
-          MeshBuilder::Paint paint;
-          paint.material = site.terrain->material(middle.x(), middle.y(), middle.z(), slope,
-                                                  grid.road_distance[grid.index(ix, iy)]);
-          paint.fixed_light = 1.0;
-          paint.lit_by_map = true;
+          const MeshBuilder::Paint paint = ground_paint(site.terrain->material(
+              middle.x(), middle.y(), middle.z(), slope, grid.road_distance[grid.index(ix, iy)]));
           chunk.builder->ground_triangle(a, b, c, paint, s0, t0);
           chunk.builder->ground_triangle(a, c, d, paint, s0, t0);
         }

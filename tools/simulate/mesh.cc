@@ -42,18 +42,24 @@ void MeshBuilder::finish(Face* face, const Paint& paint) const {
   mesh_->faces.push_back(*face);
 }
 
+void MeshBuilder::lay_texture(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                              const Eigen::Vector3d& normal, const Paint& paint, double s_m, double t_m,
+                              Face* face) {
+  const Eigen::Vector3d s = paint.texture_scale * (b - a).normalized(), t = normal.cross(s);
+  face->normal = normal.cast<float>();
+  face->s_axis = s.cast<float>();
+  face->t_axis = t.cast<float>();
+  face->s0 = static_cast<float>(s_m - s.dot(a));
+  face->t0 = static_cast<float>(t_m - t.dot(a));
+}
+
 void MeshBuilder::quad(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                        const Eigen::Vector3d& d, const Paint& paint, double s_m, double t_m) {
   Face face;
   face.corners = {a.cast<float>(), b.cast<float>(), c.cast<float>(), d.cast<float>()};
   face.count = 4;
   const Eigen::Vector3d normal = (c - a).cross(d - b).normalized();
-  const Eigen::Vector3d s = paint.texture_scale * (b - a).normalized(), t = normal.cross(s);
-  face.normal = normal.cast<float>();
-  face.s_axis = s.cast<float>();
-  face.t_axis = t.cast<float>();
-  face.s0 = static_cast<float>(s_m - s.dot(a));
-  face.t0 = static_cast<float>(t_m - t.dot(a));
+  lay_texture(a, b, normal, paint, s_m, t_m, &face);
   finish(&face, paint);
 }
 
@@ -63,12 +69,7 @@ void MeshBuilder::triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, c
   face.corners = {a.cast<float>(), b.cast<float>(), c.cast<float>(), c.cast<float>()};
   face.count = 3;
   const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
-  const Eigen::Vector3d s = paint.texture_scale * (b - a).normalized(), t = normal.cross(s);
-  face.normal = normal.cast<float>();
-  face.s_axis = s.cast<float>();
-  face.t_axis = t.cast<float>();
-  face.s0 = static_cast<float>(s_m - s.dot(a));
-  face.t0 = static_cast<float>(t_m - t.dot(a));
+  lay_texture(a, b, normal, paint, s_m, t_m, &face);
   finish(&face, paint);
 }
 
@@ -97,6 +98,14 @@ void MeshBuilder::box(const Eigen::Vector3d& base, double half_x_m, double half_
     s_m += (b - a).norm();
   }
   quad(p[0] + up, p[1] + up, p[2] + up, p[3] + up, top);
+}
+
+MeshBuilder::Paint ground_paint(int material) {
+  MeshBuilder::Paint paint;
+  paint.material = material;
+  paint.fixed_light = 1.0;
+  paint.lit_by_map = true;
+  return paint;
 }
 
 }  // namespace farpoint::tools::simulate

@@ -100,6 +100,9 @@ class MeshBuilder {
            const Paint& sides, const Paint& top, double s_m = 0.0);
 
  private:
+  // s runs from a to b and starts at s_m, t across it and starts at t_m.
+  static void lay_texture(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& normal,
+                          const Paint& paint, double s_m, double t_m, Face* face);
   void finish(Face* face, const Paint& paint) const;
 
   Mesh* mesh_;
@@ -107,5 +110,8 @@ class MeshBuilder {
   double ambient_;
   std::uint32_t cluster_begin_ = 0;
 };
+
+// Of what lies on the ground: lit by the chunk's light map alone.
+[[nodiscard]] MeshBuilder::Paint ground_paint(int material);
 
 }  // namespace farpoint::tools::simulate

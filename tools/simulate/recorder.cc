@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "daemon/calibration_message.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"
@@ -56,41 +57,21 @@ std::int64_t to_utime(double time_s) {
   return std::llround(time_s * 1e6);
 }
 
-void set_pose(const slam::SE3& pose, double position[3], double orientation[4]) {
-  for (int i = 0; i < 3; ++i) position[i] = pose.t[i];
-  orientation[0] = pose.q.w();
-  orientation[1] = pose.q.x();
-  orientation[2] = pose.q.y();
-  orientation[3] = pose.q.z();
-}
-
 calibration_t calibration_of(const Simulation& simulation) {
   const WorldDescription& world = simulation.description();
   calibration_t message{};
   message.body_name = world.drive ? "vehicle" : "drone";
   for (int i = 0; i < simulation.cameras(); ++i) {
-    const slam::Camera::Parameters& p = simulation.camera(i).parameters();
-    camera_calibration_t camera{};
-    camera.name = i == 0 ? "left" : "right";
-    if (simulation.cameras() == 1) camera.name = "camera";
-    camera.model = p.model == slam::CameraModel::kKannalaBrandt ? "kannala-brandt" : "pinhole-radtan";
-    camera.width = p.width_px;
-    camera.height = p.height_px;
-    camera.fx = p.fx_px;
-    camera.fy = p.fy_px;
-    camera.cx = p.cx_px;
-    camera.cy = p.cy_px;
-    std::copy(p.distortion.begin(), p.distortion.end(), camera.distortion);
-    set_pose(simulation.T_body_camera(i), camera.position, camera.orientation);
-    camera.rate_hz = world.camera.rate_hz;
-    camera.row_time_s = simulation.row_time_s();
-    message.cameras.push_back(camera);
+    const char* name = simulation.cameras() == 1 ? "camera" : i == 0 ? "left" : "right";
+    message.cameras.push_back(daemon::camera_message(name, simulation.camera(i).parameters(),
+                                                     simulation.T_body_camera(i), world.camera.rate_hz,
+                                                     simulation.row_time_s()));
   }
   message.ncameras = simulation.cameras();
   message.imu_orientation[0] = 1.0;
   if (!world.imu) return message;
   message.has_imu = 1;
-  set_pose(world.imu->T_body_imu, message.imu_position, message.imu_orientation);
+  daemon::set_pose(world.imu->T_body_imu, message.imu_position, message.imu_orientation);
   message.imu_rate_hz = world.imu->rate_hz;
   message.gyro_noise_density = world.imu->gyro_noise_density;
   message.gyro_random_walk = world.imu->gyro_random_walk;
@@ -120,7 +101,7 @@ class Recorder {
     ground_truth_t truth{};
     truth.utime = to_utime(time_s);
     truth.has_orientation = 1;
-    set_pose(simulation_.body().pose_at(time_s), truth.position, truth.orientation);
+    daemon::set_pose(simulation_.body().pose_at(time_s), truth.position, truth.orientation);
     if (!log_.write_message(ipc::kGroundTruthChannel, truth.utime, truth)) return false;
     for (int camera = 0; camera < simulation_.cameras(); ++camera) {
       if (!write_image(frame, camera)) return false;

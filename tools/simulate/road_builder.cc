@@ -38,14 +38,6 @@ void add_strip(const Site& site, const ChunkSite& chunk, const Edge& a, const Ed
   chunk.builder->quad(s, p, q, r, paint, texture_s_m, t);
 }
 
-MeshBuilder::Paint ground_paint(int material) {
-  MeshBuilder::Paint paint;
-  paint.material = material;
-  paint.fixed_light = 1.0;
-  paint.lit_by_map = true;
-  return paint;
-}
-
 int material_of(RoadSurface surface) {
   switch (surface) {
     case RoadSurface::kMotorway:

@@ -14,14 +14,6 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kStreetLift_m = 0.04, kPavementLift_m = 0.17;
 constexpr double kPiece_m = 8.0;
 
-MeshBuilder::Paint flat_paint(int material) {
-  MeshBuilder::Paint paint;
-  paint.material = material;
-  paint.fixed_light = 1.0;
-  paint.lit_by_map = true;
-  return paint;
-}
-
 // Draws rectangles of the town's ground, axis-parallel in the world.
 class Flats {
  public:
@@ -76,7 +68,7 @@ std::array<Side, 4> sides_of(const Block& block) {
 void add_street_pieces(const Site& site, const ChunkSite& chunk) {
   const TownDescription& town = *site.world->town;
   const Flats flats(site, chunk);
-  const MeshBuilder::Paint road = flat_paint(kRoadTwoLanes), crossing = flat_paint(kAsphalt);
+  const MeshBuilder::Paint road = ground_paint(kRoadTwoLanes), crossing = ground_paint(kAsphalt);
   constexpr double kHalf = kStreetHalfWidth_m;
   const auto pieces = [&](const std::vector<double>& along, double across, bool vertical) {
     for (std::size_t i = 0; i + 1 < along.size(); ++i) {
@@ -106,7 +98,7 @@ void add_street_pieces(const Site& site, const ChunkSite& chunk) {
       chunk.builder->begin_cluster();
       flats.rectangle(x - kHalf, y - kHalf, x + kHalf, y + kHalf, kStreetLift_m, crossing, false,
                       std::fmod(x, 16.0), std::fmod(y, 24.0));
-      MeshBuilder::Paint stripe = flat_paint(kKerb);
+      MeshBuilder::Paint stripe = ground_paint(kKerb);
       stripe.brightness = 1.3;
       for (const double side : {-1.0, 1.0}) {  // zebra crossings on two of the four arms
         for (int i = 0; i < 7; ++i) {
@@ -128,7 +120,7 @@ void add_street_pieces(const Site& site, const ChunkSite& chunk) {
 // Pavement and kerb along a side of a block.
 void add_pavement(const Site& site, const ChunkSite& chunk, const Side& side, double width_m) {
   const Flats flats(site, chunk);
-  const MeshBuilder::Paint slabs = flat_paint(kPavement), skirt = flat_paint(kConcrete);
+  const MeshBuilder::Paint slabs = ground_paint(kPavement), skirt = ground_paint(kConcrete);
   MeshBuilder::Paint kerb;
   kerb.material = kKerb;
   const int count = std::max(1, static_cast<int>(std::ceil(side.length_m / kPiece_m)));
@@ -305,7 +297,7 @@ void build_yard(const Site& site, const ChunkSite& chunk) {
       const double x0 = -half_x + yard.length_m * ix / nx, x1 = -half_x + yard.length_m * (ix + 1) / nx;
       const double y0 = -half_y + yard.width_m * iy / ny, y1 = -half_y + yard.width_m * (iy + 1) / ny;
       if (!chunk.holds(0.5 * (x0 + x1), 0.5 * (y0 + y1))) continue;
-      flats.rectangle(x0, y0, x1, y1, kStreetLift_m, flat_paint((ix + iy) % 3 == 0 ? kAsphalt : kPavement),
+      flats.rectangle(x0, y0, x1, y1, kStreetLift_m, ground_paint((ix + iy) % 3 == 0 ? kAsphalt : kPavement),
                       false, x0 + half_x, y0 + half_y);
     }
   }

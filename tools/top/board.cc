@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "slam/estimator.h"
+
 namespace farpoint::tools {
 namespace {
 
@@ -56,9 +58,7 @@ const char* scale_text(int scale) {
 }  // namespace
 
 const char* state_name(int state) {
-  constexpr std::array names = {"starting", "initialising", "settling",     "tracking",
-                                "degraded", "lost",         "relocalising", "no camera"};
-  return state >= 0 && state < int(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
+  return state >= 0 && state <= int(slam::State::kNoCamera) ? slam::to_string(slam::State(state)) : "?";
 }
 
 const char* can_state_name(int state) {
