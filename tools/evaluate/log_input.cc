@@ -156,6 +156,7 @@ class RunCollector {
     const double frame_ms = message.cpu_ms[timing_t::STAGE_FRAME];
     if (frame_ms >= 0.0) log_.frame_ms.push_back(frame_ms);
     if (message.deadline_missed != 0) ++log_.deadline_misses;
+    log_.peak_resident_bytes = std::max(log_.peak_resident_bytes, message.peak_resident_bytes);
     return true;
   }
   bool add_trajectory(const ipc::LogEvent& event) {
