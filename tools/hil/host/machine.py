@@ -2,7 +2,6 @@
 
 import pathlib
 import subprocess
-import time
 
 from host import material
 from host.scenario import GUEST_TIMEOUT
@@ -11,7 +10,6 @@ NO_STATUS = 125
 # The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest sees
 # a processor of the same speed. Waiting for the disk lets its time jump, so what has a deadline is in memory first.
 VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
-BOOT_S, BOOT_TRIES = 90, 3
 SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
 
@@ -36,34 +34,15 @@ def command(guest_folder, one, folder):
 
 def run(guest_folder, one, folder):
     """The scenario's status."""
-    for _ in range(BOOT_TRIES):
-        status = run_once(guest_folder, one, folder)
-        # On a busy host the emulated machine now and then stands still while it boots: that says nothing of a scenario.
-        if (folder / "started").exists():
-            break
-    # The guest's status N ends QEMU with 2N+1. Any other end is one that no scenario asked for.
-    if status == GUEST_TIMEOUT:
-        return status
-    return status >> 1 if status % 2 == 1 else NO_STATUS
-
-
-def run_once(guest_folder, one, folder):
     with open(folder / "console", "wb") as console:
         machine = subprocess.Popen(command(guest_folder, one, folder), stdin=subprocess.DEVNULL, stdout=console,
                                    stderr=console)
         try:
-            if not has_started(machine, folder):
-                return GUEST_TIMEOUT
-            return machine.wait(timeout=one.timeout_s)
+            status = machine.wait(timeout=one.timeout_s)
         except subprocess.TimeoutExpired:
             return GUEST_TIMEOUT
         finally:
             machine.kill()
             machine.wait()
-
-
-def has_started(machine, folder):
-    until = time.monotonic() + BOOT_S
-    while not (folder / "started").exists() and machine.poll() is None and time.monotonic() < until:
-        time.sleep(0.1)
-    return (folder / "started").exists()
+    # The guest's status N ends QEMU with 2N+1. Any other end is one that no scenario asked for.
+    return status >> 1 if status % 2 == 1 else NO_STATUS

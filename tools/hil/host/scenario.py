@@ -5,7 +5,7 @@
     #@ machine: systemd               else the scenario is the machine's first program
     #@ devices: -device ...           further devices of the machine
     #@ needs: package                 the .deb is laid beside it
-    #@ timeout_s: 120
+    #@ timeout_s: 120                 of this machine's time; the guest's goes on its own
     #@ check: NAME ARGUMENT...        of checks.py, on what it left; any number
     #@ broken: what is left out or inverted where $BROKEN is set
     #@ broken_says: the complaint that must follow, a regular expression
@@ -27,7 +27,7 @@ class Scenario:
     machine: str = "plain"
     devices: str = ""
     needs: str = ""
-    timeout_s: float = 180
+    timeout_s: float = 900
     broken: str = ""
     broken_says: str = ""
     checks: list = dataclasses.field(default_factory=list)

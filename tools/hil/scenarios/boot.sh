@@ -1,6 +1,5 @@
 # The guest boots, runs the build's own programs on its own libraries, and hands their status to the host.
 #@ form: short
-#@ timeout_s: 90
 #@ broken: the scenario ends with status 7
 #@ broken_says: ^status 7
 /tmp/farpointd --version || fail "farpointd does not run"

@@ -2,7 +2,6 @@
 #@ form: long
 #@ machine: systemd
 #@ needs: package
-#@ timeout_s: 240
 #@ broken: the limit is not lowered
 #@ broken_says: ^the kill at the limit: not within
 install_service

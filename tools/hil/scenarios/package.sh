@@ -2,7 +2,6 @@
 #@ form: long
 #@ machine: systemd
 #@ needs: package
-#@ timeout_s: 240
 #@ broken: the package of the upgrade does not restart the service
 #@ broken_says: ^restart by the upgrade: not within
 install_service

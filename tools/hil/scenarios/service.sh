@@ -2,7 +2,6 @@
 #@ form: short
 #@ machine: systemd
 #@ needs: package
-#@ timeout_s: 240
 #@ broken: nothing hangs
 #@ broken_says: ^restart of a hung tracker: not within
 install_service
