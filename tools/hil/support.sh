@@ -1,13 +1,14 @@
-# What scenarios share. Each runs in /hil, the folder that the host reads afterwards; what must be quick is in /tmp.
+# What scenarios share. $left is the folder that the host reads afterwards; what must be quick is in /tmp.
 daemon_log=/tmp/daemon.log
 control=/tmp/control
-cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
+began=$(date +%s)
+cd "$root" && cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
 # The machine's time jumps while it waits for its disk: libraries and tools are read before anything is timed.
 /tmp/farpointd --version > /dev/null
-/tmp/farpoint --version > /dev/null
+/tmp/farpoint --help > /dev/null
 cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/bin/journalctl /usr/bin/systemctl /usr/sbin/tc /usr/sbin/ip > /dev/null
 
-bring_back() { cp -t /hil /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
+bring_back() { cp -t "$left" /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
 trap bring_back EXIT
 
 # fail TEXT: ends the scenario with this complaint.
@@ -15,25 +16,32 @@ fail() {
   echo "$*" > /tmp/complaint
   echo "complaint: $*"
   tail -20 $daemon_log 2> /dev/null
-  journalctl -u farpointd -o short-monotonic --no-pager 2> /dev/null | tail -40
+  journalctl -u farpointd --since "@$began" -o short-monotonic --no-pager 2> /dev/null | tail -40
   exit 1
 }
 
 # figure TEXT: for the table.
 figure() { echo "$*" >> /tmp/figures; }
 
-seconds() { cut -d' ' -f1 /proc/uptime; }
-since() { echo "$(seconds) $1" | awk '{printf "%.2f", $1 - $2}'; }
+# Without further processes, each of which costs the emulated processor some ms.
+hundredths() { read -r uptime _ < /proc/uptime; now=${uptime/./}; }
+seconds() { hundredths; echo "$((now / 100)).$(printf %02d $((now % 100)))"; }
+# since S: seconds since then.
+since() { hundredths; local past=$((now - 10#${1/./})); echo "$((past / 100)).$(printf %02d $((past % 100)))"; }
 at_most() { echo "$1 $2" | awk '{exit !($1 <= $2)}'; }
+exec {never}<> <(:)
+rest() { read -r -t 0.05 -u $never; }
 
 # wait_until SECONDS WHAT COMMAND...: the scenario fails where COMMAND does not succeed in time.
 wait_until() {
-  local for_s=$1 what=$2 from
+  local for_s=$1 what=$2 last
   shift 2
-  from=$(seconds)
+  hundredths
+  last=$((now + 100 * for_s))
   until "$@" > /dev/null 2>&1; do
-    at_most "$(since "$from")" "$for_s" || fail "$what: not within $for_s s"
-    sleep 0.05
+    hundredths
+    [ $now -le $last ] || fail "$what: not within $for_s s"
+    rest
   done
 }
 
@@ -100,13 +108,15 @@ go() { touch /tmp/go; }
 main_pid() { systemctl show -p MainPID --value farpointd; }
 # has_other_pid PID: the service runs, as another process.
 has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemctl -q is-active farpointd; }
-journal_says() { journalctl -u farpointd -o cat --no-pager | grep -q -- "$1"; }
-frames_tracked() { farpoint ctl status | grep -o '[0-9]* frames tracked' | cut -d' ' -f1; }
-service_tracks() { [ "$(frames_tracked)" -ge 5 ]; }
+journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
+# service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
+service_tracks() {
+  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] && [ "${BASH_REMATCH[1]}" -ge 5 ]
+}
 
 # The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.
 install_service() {
-  dpkg -i /hil/farpoint.deb > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
+  dpkg -i "$root/farpoint.deb" > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
   write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control /dev/video10 /etc/farpoint/camera.yaml
   install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
   systemctl start systemd-networkd

@@ -76,14 +76,20 @@ class Stock:
             made = list(self.folder.glob("package/*.deb"))
         return made[0]
 
-    def lay_out(self, one, folder, broken):
+    def lay_out(self, several, folder, broken):
+        """What a machine is given that runs these scenarios; each has a folder of its own for what it leaves."""
         for program in PROGRAMS:
             shutil.copy(self.build / "bin" / program, folder)
         for file in self.folder.iterdir():
             if file.is_file():
                 shutil.copy(file, folder)
-        shutil.copy(self.here / "support.sh", folder)
-        if one.needs == "package":
+        shutil.copy(self.here / "run_scenarios.sh", folder / "scenario")
+        if any(one.needs == "package" for one in several):
             shutil.copy(self.package(), folder / "farpoint.deb")
-        head = f"BROKEN={'yes' if broken else ''}\nsource /hil/support.sh\n"
-        (folder / "scenario").write_text(head + one.script)
+        support = (self.here / "support.sh").read_text()
+        for one in several:
+            (folder / one.name).mkdir()
+            script = f"BROKEN={'yes' if broken else ''}\n{support}\n{one.script}"
+            (folder / one.name / "scenario").write_text(script)
+            (folder / one.name / "frames.grey").symlink_to(folder / "frames.grey")
+        (folder / "names").write_text("".join(one.name + "\n" for one in several))

@@ -2,10 +2,9 @@
 
     # What is proved, in one line.
     #@ form: short                    or long
-    #@ machine: systemd               else the scenario is the machine's first program
+    #@ machine: systemd               else in a machine without it
     #@ devices: -device ...           further devices of the machine
     #@ needs: package                 the .deb is laid beside it
-    #@ timeout_s: 120                 of this machine's time; the guest's goes on its own
     #@ check: NAME ARGUMENT...        of checks.py, on what it left; any number
     #@ broken: what is left out or inverted where $BROKEN is set
     #@ broken_says: the complaint that must follow, a regular expression
@@ -14,8 +13,6 @@
 import dataclasses
 import pathlib
 import re
-
-GUEST_TIMEOUT = 124
 
 
 @dataclasses.dataclass
@@ -27,7 +24,6 @@ class Scenario:
     machine: str = "plain"
     devices: str = ""
     needs: str = ""
-    timeout_s: float = 900
     broken: str = ""
     broken_says: str = ""
     checks: list = dataclasses.field(default_factory=list)
@@ -45,8 +41,6 @@ def read(path):
         key, value = line[3:].split(": ", 1)
         if key == "check":
             one.checks.append(value.split())
-        elif key == "timeout_s":
-            one.timeout_s = float(value)
         elif key in ("form", "machine", "devices", "needs", "broken", "broken_says"):
             setattr(one, key, value)
         else:
@@ -60,20 +54,18 @@ def read_all(folder):
     return [read(path) for path in sorted(pathlib.Path(folder).glob("*.sh"))]
 
 
-def complaint_of(folder, status):
+def complaint_of(folder):
     """What the scenario itself complained of; None where it ended well."""
-    if status == 0:
+    if not (folder / "status").exists():
+        return "it did not end in time" if (folder / "out").exists() else "the machine did not come to it"
+    status = (folder / "status").read_text().strip()
+    if status == "0":
         return None
-    said = folder / "complaint"
-    if said.exists():
-        return said.read_text().strip()
-    if status == GUEST_TIMEOUT:
-        return "the scenario did not end in time"
-    out = folder / "out"
-    last = out.read_text(errors="replace").strip().splitlines()[-1:] if out.exists() else []
+    if (folder / "complaint").exists():
+        return (folder / "complaint").read_text().strip()
+    last = (folder / "out").read_text(errors="replace").strip().splitlines()[-1:]
     return f"status {status}" + (": " + last[0] if last else ", nothing was said")
 
 
-def figures_of(folder):
-    figures = folder / "figures"
-    return figures.read_text().splitlines() if figures.exists() else []
+def lines_of(folder, name):
+    return (folder / name).read_text().splitlines() if (folder / name).exists() else []

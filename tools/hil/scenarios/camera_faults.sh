@@ -1,6 +1,6 @@
 # vivid: 30 % dropped buffers, buffers flagged as damaged, a fatal streaming error, a disconnected device.
 #@ form: short
-#@ check: status out.lcm images_flagged=5..5 camera_losses=2..2 frames_dropped=0..0 times_backwards=0..0 images_missing=10..60
+#@ check: status out.lcm images_flagged=5..5 camera_losses=2..2 frames_dropped=0..0 frames_tracked=80..200 times_backwards=0..0 images_missing=10..60
 #@ broken: no buffer is dropped
 #@ broken_says: ^images_missing 0
 find_vivid() { grep -l vivid.*vid-cap /sys/class/video4linux/*/name | head -1 | cut -d/ -f5; }
@@ -9,8 +9,6 @@ start_vivid() {
   wait_until 10 "vivid's node" test -e "/dev/$(find_vivid)"
 }
 inject() { v4l2-ctl -d "$device" -c "$1" || fail "vivid has no $1"; }
-images_so_far() { /tmp/farpoint ctl status --socket $control | grep -o '[0-9]* frames tracked' | cut -d' ' -f1; }
-images_come() { [ "$(images_so_far)" -gt $((before + 3)) ]; }
 
 start_vivid
 device=/dev/$(find_vivid)
@@ -38,8 +36,7 @@ inject disconnect=1
 from=$(seconds)
 wait_until 5 "the disconnection is noticed" said_times "lost:" 2
 wait_until 10 "stream after the disconnection" said_times "streams" 3
-figure "disconnected and back: after $(since "$from") s"
-before=$(images_so_far)
-wait_until 5 "images after all of it" images_come
+figure "disconnected: streams again after $(since "$from") s"
+sleep 1
 stop_daemon
-cp -t /hil /tmp/out.lcm
+cp -t "$left" /tmp/out.lcm

@@ -23,4 +23,4 @@ wait_until 5 "frames after the silence" said_times "no_camera -> " $((so_far + 1
 figure "frames again after $(since "$from") s"
 kill $player
 stop_daemon
-cp -t /hil /tmp/out.lcm
+cp -t "$left" /tmp/out.lcm

@@ -16,5 +16,5 @@ dump=$!
 wait $player || fail "the frames could not be played"
 kill $dump
 stop_daemon
-cp /tmp/played /tmp/can.log /hil
-[ -z "$BROKEN" ] || sed -i '101,108d' /hil/can.log
+cp /tmp/played /tmp/can.log "$left"
+[ -z "$BROKEN" ] || sed -i '101,108d' "$left/can.log"

@@ -17,7 +17,7 @@ receive() {
   figure "$1: frames again after $(since "$from") s"
   sleep 4
   kill $dump
-  cp "/tmp/after_$1.log" /hil
+  cp "/tmp/after_$1.log" "$left"
 }
 
 loopback
@@ -44,7 +44,7 @@ receive full
 
 kill $player
 stop_daemon
-cp /tmp/played /hil
+cp /tmp/played "$left"
 refused=$(grep -o '[0-9]* CAN frames were not sent' $daemon_log | cut -d' ' -f1)
 [ "${refused:-0}" -ge 100 ] || fail "only ${refused:-0} CAN frames were counted as not sent"
 figure "$refused frames counted as not sent"

@@ -26,4 +26,4 @@ dump=$!
 wait $player || fail "the frames could not be played"
 kill $dump $hogs
 stop_daemon
-cp -t /hil /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/can.log
+cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/can.log

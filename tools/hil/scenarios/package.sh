@@ -11,7 +11,7 @@ systemctl start farpointd || fail "systemctl start failed"
 wait_until 30 "the service tracks frames" service_tracks
 pid=$(main_pid)
 
-dpkg-deb -R /hil/farpoint.deb /tmp/next || fail "the package cannot be unpacked"
+dpkg-deb -R "$root/farpoint.deb" /tmp/next || fail "the package cannot be unpacked"
 sed -i 's/^Version: .*/&+next/' /tmp/next/DEBIAN/control
 [ -z "$BROKEN" ] || sed -i '/try-restart/d' /tmp/next/DEBIAN/postinst
 dpkg-deb -b -Znone /tmp/next /tmp/next.deb > /dev/null || fail "the next version cannot be made"

@@ -13,4 +13,4 @@ go
 wait $player || fail "the frames could not be played"
 /tmp/farpoint ctl status --socket $control || fail "no answer of the control socket"
 stop_daemon
-cp -t /hil /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/farpoint.yaml
+cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/farpoint.yaml

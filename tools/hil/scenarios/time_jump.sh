@@ -23,4 +23,4 @@ wait $player || fail "the frames could not be played"
 stop_daemon
 [ "$(said "-> no_camera")" -le 2 ] || fail "no_camera was said because of the time"
 ! says "-> lost" || fail "tracking was lost"
-cp -t /hil /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/farpoint.yaml
+cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played /tmp/farpoint.yaml

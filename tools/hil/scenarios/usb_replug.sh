@@ -29,5 +29,5 @@ done
 kill $camera
 wait $camera
 stop_daemon
-cp -t /hil /tmp/run.lcm /tmp/out.lcm /tmp/played
+cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played
 figure "streams again after$(echo "$times" | tr ' ' '\n' | sort -n | sed -n '2p;$p' | tr '\n' ' ' | awk '{print " " $1 " to " $2 " s"}')"
