@@ -5,8 +5,9 @@ import subprocess
 
 from host import material
 
-# The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the
-# guest sees a processor of the same speed. Waiting for the disk lets its time jump, so what has a deadline is in memory first.
+# The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest
+# sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
+# first.
 VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
 SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
