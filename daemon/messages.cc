@@ -229,11 +229,12 @@ trajectory_t make_trajectory(const RunEnd& end) {
   return m;
 }
 
-landmarks_t make_landmarks(const RunEnd& end, const SightingsOfLandmarks& sightings) {
+landmarks_t make_landmarks(const RunEnd& end, std::span<const slam::LandmarkInfo> part,
+                           const SightingsOf& sightings) {
   landmarks_t m{};
   m.utime = end.utime;
   m.scale_state = static_cast<std::int8_t>(end.last.scale);
-  for (const slam::LandmarkInfo& info : end.landmarks) {
+  for (const slam::LandmarkInfo& info : part) {
     if (!info.full || !(info.inverse_depth > 0.0)) continue;
     landmark_t l{};
     l.map_id = info.map_id;
@@ -248,12 +249,10 @@ landmarks_t make_landmarks(const RunEnd& end, const SightingsOfLandmarks& sighti
     l.created_utime = info.created_utime;
     l.creation_depth = static_cast<float>(info.creation_depth * end.unit_scale);
     l.creation_relative_sigma = static_cast<float>(info.creation_relative_sigma);
-    if (const auto seen = sightings.find(info.id); seen != sightings.end()) {
-      for (const Sighting& s : seen->second) {
-        l.sighting_utime.push_back(s.utime);
-        l.sighting_u.push_back(s.pixel.x());
-        l.sighting_v.push_back(s.pixel.y());
-      }
+    for (const slam::LandmarkSighting& s : sightings(info)) {
+      l.sighting_utime.push_back(s.utime);
+      l.sighting_u.push_back(s.pixel.x());
+      l.sighting_v.push_back(s.pixel.y());
     }
     l.nsightings = static_cast<std::int32_t>(l.sighting_utime.size());
     m.landmarks.push_back(std::move(l));

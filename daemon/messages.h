@@ -2,9 +2,9 @@
 // bytes.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "bot_core/pose_t.hpp"
@@ -32,13 +32,6 @@ struct MapContent {
 [[nodiscard]] map_t make_map(const FrameOutput& frame, const MapContent& content, int max_points,
                              double unit_scale);
 
-struct Sighting {
-  std::int64_t utime = 0;
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
-};
-using SightingsOfLandmarks =
-    std::unordered_map<std::uint64_t, std::vector<Sighting>>;  // by the landmark's id
-
 // Everything the end of a run is summarised from.
 struct RunEnd {
   std::int64_t utime = 0;   // of the last frame
@@ -53,7 +46,10 @@ struct RunEnd {
   double unit_scale = 1.0;  // published units a map unit
 };
 [[nodiscard]] trajectory_t make_trajectory(const RunEnd& end);
-[[nodiscard]] landmarks_t make_landmarks(const RunEnd& end, const SightingsOfLandmarks& sightings);
+// Of `part` (of end.landmarks) what has become a point, with what `sightings` gives of each.
+using SightingsOf = std::function<std::vector<slam::LandmarkSighting>(const slam::LandmarkInfo&)>;
+[[nodiscard]] landmarks_t make_landmarks(const RunEnd& end, std::span<const slam::LandmarkInfo> part,
+                                         const SightingsOf& sightings);
 // Counts of refused input, configuration, build and hashes are the caller's to fill.
 [[nodiscard]] summary_t make_summary(const RunEnd& end, const Config& config);
 

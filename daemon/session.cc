@@ -2,7 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "daemon/build_info.h"
 #include "daemon/errors.h"
@@ -11,6 +13,9 @@
 
 namespace farpoint::daemon {
 namespace {
+
+// The end of a run must not need more memory than the run: the map's points leave in pieces of some 100 kB.
+constexpr std::size_t kLandmarksAMessage = 500;
 
 using MemoryTable = std::vector<std::pair<std::string, std::size_t>>;
 
@@ -116,11 +121,13 @@ void Session::publish_results(const InputCounts& in) {
 }
 
 void Session::publish_landmarks() {
-  SightingsOfLandmarks sightings;
-  estimator_.visit_sightings([&](std::uint64_t id, std::int64_t utime, const Eigen::Vector2f& pixel) {
-    sightings[id].push_back({utime, pixel});
-  });
-  publisher_->publish_result(ipc::kLandmarksChannel, end_.utime, make_landmarks(end_, sightings));
+  const std::span<const slam::LandmarkInfo> all(end_.landmarks);
+  const auto sightings = [this](const slam::LandmarkInfo& l) { return estimator_.sightings(l); };
+  for (std::size_t first = 0; first < all.size(); first += kLandmarksAMessage) {
+    const std::size_t count = std::min(kLandmarksAMessage, all.size() - first);
+    publisher_->publish_result(ipc::kLandmarksChannel, end_.utime,
+                               make_landmarks(end_, all.subspan(first, count), sightings));
+  }
 }
 
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,

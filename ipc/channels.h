@@ -21,7 +21,7 @@ inline constexpr char kCalibrationChannel[] = "CALIBRATION";         // calibrat
 inline constexpr char kGroundTruthChannel[] = "GROUND_TRUTH";        // ground_truth_t
 inline constexpr char kSimulationChannel[] = "SIMULATION";           // simulation_t, of a simulated recording
 inline constexpr char kTrajectoryChannel[] = "FARPOINT_TRAJECTORY";  // trajectory_t, once, at the end
-inline constexpr char kLandmarksChannel[] = "FARPOINT_LANDMARKS";    // landmarks_t, once, at the end
+inline constexpr char kLandmarksChannel[] = "FARPOINT_LANDMARKS";    // landmarks_t, at the end
 inline constexpr char kSummaryChannel[] = "FARPOINT_SUMMARY";        // summary_t, once, at the end
 
 // What goes to UDP by default: one host.

@@ -152,8 +152,11 @@ std::vector<MapTrajectory> Estimator::trajectories() const {
 std::vector<LandmarkInfo> Estimator::landmarks() const {
   std::vector<LandmarkInfo> out;
   const Map& map = impl_->mapping.mapper().map();
-  map.landmarks().for_each([&](LandmarkHandle, const Landmark& l) {
+  out.reserve(map.landmarks().size());
+  map.landmarks().for_each([&](LandmarkHandle h, const Landmark& l) {
     LandmarkInfo i;
+    i.slot = h.index;
+    i.generation = h.generation;
     i.id = l.id;
     i.map_id = l.map_id;
     const Eigen::Vector4d p = map.world_point(l);
@@ -186,12 +189,14 @@ void Estimator::visit_observation_distances(const std::function<void(std::int32_
   });
 }
 
-void Estimator::visit_sightings(
-    const std::function<void(std::uint64_t, std::int64_t, const Eigen::Vector2f&)>& visit) const {
+std::vector<LandmarkSighting> Estimator::sightings(const LandmarkInfo& landmark) const {
+  std::vector<LandmarkSighting> out;
   const Map& map = impl_->mapping.mapper().map();
-  map.landmarks().for_each([&](LandmarkHandle, const Landmark& l) {
-    for (const Observation& o : l.observations) visit(l.id, map.keyframes()[o.keyframe].utime, o.pixel);
-  });
+  if (const Landmark* l = map.landmarks().get({landmark.slot, landmark.generation})) {
+    out.reserve(l->observations.size());
+    for (const Observation& o : l->observations) out.push_back({map.keyframes()[o.keyframe].utime, o.pixel});
+  }
+  return out;
 }
 
 std::vector<SE3> Estimator::keyframe_poses() const {

@@ -122,6 +122,13 @@ struct LandmarkInfo {
   Eigen::Vector3d anchor_map = Eigen::Vector3d::Zero();  // map units
   std::int64_t created_utime = 0;  // of the keyframe at which it became a point; bearings: when it was made
   std::uint64_t tag = 0;           // simulator: which true point the host patch shows; 0 elsewhere
+  std::uint32_t slot = 0, generation = 0;  // where the map keeps it (Estimator::sightings)
+};
+
+// Where a keyframe saw a landmark.
+struct LandmarkSighting {
+  std::int64_t utime = 0;
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level-0 pixel
 };
 
 // Camera 0's calibration as refined from the map, relative to the given one; zero where refinement is off.
@@ -183,9 +190,8 @@ class Estimator {
   // camera-to-point distance in map units.
   void visit_observation_distances(
       const std::function<void(std::int32_t map_id, double distance)>& visit) const;
-  // Calls visit(landmark_id, utime, pixel) for every sighting of every landmark, in ascending time for each.
-  void visit_sightings(const std::function<void(std::uint64_t landmark_id, std::int64_t utime,
-                                                const Eigen::Vector2f& pixel)>& visit) const;
+  // By ascending keyframe; empty where the landmark has gone since landmarks() told of it.
+  [[nodiscard]] std::vector<LandmarkSighting> sightings(const LandmarkInfo& landmark) const;
   [[nodiscard]] std::vector<SE3> keyframe_poses() const;
   [[nodiscard]] CalibrationInfo calibration() const;
   // Bytes of every pool, for the table printed at start.

@@ -23,12 +23,12 @@ struct Keyframe {
   int camera = 0;
   SE3 T_world_body;
 
-  FeatureSet set;
-  std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
+  FeatureSet set;                         // Map::thin_keyframe leaves only corners of landmarks
   std::vector<LandmarkHandle> landmarks;  // one a feature; null: none
+  // For the search for new landmarks, while the keyframe is recent (CapacityConfig::window_images):
+  std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
   FeatureGrid grid;
-  // Pixels for alignment, while the keyframe is recent (CapacityConfig::window_images).
-  std::shared_ptr<const FrameImage> image;
+  std::shared_ptr<const FrameImage> image;  // pixels for alignment
 
   std::vector<Covisible> covisible;  // most shared first, then newest first
   std::uint64_t optimised = 0;       // times local BA moved it

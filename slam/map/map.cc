@@ -60,6 +60,30 @@ void Map::remove_keyframe(KeyframeHandle handle) {
   keyframes_.release(handle);
 }
 
+void Map::thin_keyframe(KeyframeHandle handle) {
+  Keyframe& k = keyframes_[handle];
+  if (!k.image) return;  // it has been thinned before
+  k.image.reset();
+  std::vector<Feature> features;
+  std::vector<LandmarkHandle> landmarks;
+  const auto used = static_cast<std::size_t>(
+      std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
+  features.reserve(used);
+  landmarks.reserve(used);
+  for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
+    Landmark* l = landmarks_.get(k.landmarks[i]);
+    if (l == nullptr) continue;
+    for (Observation& o : l->observations)
+      if (o.keyframe == handle) o.feature = static_cast<std::int32_t>(landmarks.size());
+    features.push_back(k.set.features[i]);
+    landmarks.push_back(k.landmarks[i]);
+  }
+  k.set = {std::move(features), {}};
+  k.landmarks = std::move(landmarks);
+  k.bearings = {};
+  k.grid = FeatureGrid();
+}
+
 LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   Keyframe& keyframe = keyframes_[host];
   if (!keyframe.landmarks[feature].is_null() || !keyframe.image) return {};

@@ -55,14 +55,14 @@ void cull_redundant_keyframes(const std::vector<KeyframeHandle>& candidates, std
 
 void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Map* map,
                   MappingCounts* counts) {
-  // Pixels stay with the newest keyframes only.
+  // Pixels, and features without a landmark, stay with the newest keyframes only.
   const auto kept = static_cast<std::uint64_t>(images);
   std::vector<KeyframeHandle> alive;
   map->keyframes().for_each([&](KeyframeHandle h, const Keyframe&) { alive.push_back(h); });
   std::sort(alive.begin(), alive.end(), [map](KeyframeHandle a, KeyframeHandle b) {
     return map->keyframes()[a].id > map->keyframes()[b].id;
   });
-  for (std::size_t i = kept; i < alive.size(); ++i) map->keyframes()[alive[i]].image.reset();
+  for (std::size_t i = kept; i < alive.size(); ++i) map->thin_keyframe(alive[i]);
   // A full map forgets its oldest keyframe.
   while (map->keyframes().full() && !alive.empty()) {
     if (alive.back() == newest) break;

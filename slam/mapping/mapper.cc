@@ -508,8 +508,8 @@ bool Mapper::consistent() const {
 }
 
 void Mapper::retire_map(std::int32_t map_id) {
-  map_.keyframes().for_each([map_id](KeyframeHandle, Keyframe& k) {
-    if (k.map_id == map_id) k.image.reset();
+  map_.keyframes().for_each([&](KeyframeHandle h, const Keyframe& k) {
+    if (k.map_id == map_id) map_.thin_keyframe(h);
   });
 }
 

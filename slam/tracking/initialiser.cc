@@ -42,12 +42,12 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
 
-// Only the frame half way between the reference and now can be the next reference. What is older never can
-// again: those pixels go back to the pool.
+// Only a frame about half way between the reference and now can be the next reference. What is older never
+// can again, and every second frame will do: the other pixels go back to the pool.
 void Initialiser::forget_pixels(std::uint64_t age) {
   const std::uint64_t half = reference_->number + (age + 1) / 2;
   for (const std::shared_ptr<Frame>& f : history_)
-    if (f->number < half && f != reference_) f->image.reset();
+    if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->image.reset();
 }
 
 void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
@@ -145,7 +145,7 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
     // or there is none, this one.
     const std::uint64_t half = reference_->number + (age + 1) / 2;
     const auto next = std::find_if(history_.begin(), history_.end(),
-                                   [&](const std::shared_ptr<Frame>& f) { return f->number >= half; });
+                                   [&](const auto& f) { return f->number >= half && f->image != nullptr; });
     set_reference(next != history_.end() && age > 1 ? *next : frame);
     match(*frame, &pairs_);
     last_matches_ = static_cast<int>(pairs_.size());

@@ -108,7 +108,8 @@ class Shaker {
     if (what < 85) return remove_observation(l);
     if (what < 88) return map_.remove_landmark(l);
     if (what < 92) return map_.fuse(l, landmarks[random_.below(landmarks.size())]);
-    if (what < 96) return map_.rehost(l, k);
+    if (what < 95) return map_.rehost(l, k);
+    if (what < 97) return map_.thin_keyframe(k);
     map_.update_covisibility(k);
   }
 
@@ -129,11 +130,13 @@ class Shaker {
     ++gone;
   }
   void add_landmark(KeyframeHandle k) {
-    const std::size_t feature = random_.below(kFeatures);
-    const bool taken = !map_.keyframes()[k].landmarks[feature].is_null();
+    const Keyframe& keyframe = map_.keyframes()[k];
+    if (keyframe.landmarks.empty()) return;
+    const std::size_t feature = random_.below(keyframe.landmarks.size());
+    const bool impossible = !keyframe.landmarks[feature].is_null() || !keyframe.image;
     const bool was_full = map_.landmarks().full();
     const LandmarkHandle h = map_.add_landmark(k, feature);
-    EXPECT_EQ(h.is_null(), taken || was_full);
+    EXPECT_EQ(h.is_null(), impossible || was_full);
     if (h.is_null()) return;
     handles.push_back(h);
     Landmark& l = map_.landmarks()[h];
@@ -141,7 +144,8 @@ class Shaker {
     l.inverse_depth = random_.uniform(0.0, 0.2);
   }
   void add_observation(LandmarkHandle l, KeyframeHandle k) {
-    const std::size_t feature = random_.below(kFeatures);
+    if (map_.keyframes()[k].landmarks.empty()) return;
+    const std::size_t feature = random_.below(map_.keyframes()[k].landmarks.size());
     const bool taken = !map_.keyframes()[k].landmarks[feature].is_null();
     const bool seen = Map::find_observation(map_.landmarks()[l], k) != nullptr;
     const bool ok = map_.add_observation(l, sighting(map_, k, feature));
@@ -423,6 +427,27 @@ void expect_unmoved(const Geometry& a, const Geometry& b) {
   EXPECT_LT((a.point - b.point).norm(), 1e-9);
   EXPECT_LT((a.anchor.t - b.anchor.t).norm(), 1e-9);
   EXPECT_LT((a.anchor.rotation() - b.anchor.rotation()).norm(), 1e-9);
+}
+
+TEST_F(MapTest, AThinnedKeyframeKeepsWhatItsLandmarksNeed) {
+  const auto k = keyframes(3);
+  const LandmarkHandle high = landmark(k, 7), low = landmark({k[1], k[0]}, 2);
+  const Keyframe before = map.keyframes()[k[0]];
+  map.thin_keyframe(k[0]);
+  const Keyframe& after = map.keyframes()[k[0]];
+  check(map, capacity);
+  ASSERT_EQ(after.landmarks, (std::vector{low, high}));
+  EXPECT_EQ(after.set.features[0].u_px, before.set.features[2].u_px);
+  EXPECT_EQ(after.set.features[1].u_px, before.set.features[7].u_px);
+  EXPECT_TRUE(after.set.descriptors.empty());
+  EXPECT_TRUE(after.bearings.empty());
+  EXPECT_EQ(after.image, nullptr);
+  // Its slots are those of landmarks: a freed one can take a sighting again.
+  map.remove_landmark(low);
+  EXPECT_TRUE(map.keyframes()[k[0]].landmarks[0].is_null());
+  EXPECT_TRUE(map.add_landmark(k[0], 0).is_null()) << "no pixels to cut a patch from";
+  map.thin_keyframe(k[0]);  // once is enough
+  EXPECT_EQ(map.keyframes()[k[0]].landmarks.size(), 2U);
 }
 
 TEST_F(MapTest, WorldPointLiesOnTheHostsRay) {

@@ -3,23 +3,16 @@
 // happens to reach.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "tests/replay/recordings.h"
+
+namespace farpoint::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-const fs::path kData = fs::path(FARPOINT_SOURCE_DIR) / ".." / "shared" / "data";
-const fs::path kBin = fs::path(FARPOINT_BINARY_DIR) / "bin";
-
-// Status of a shell command; what it prints goes to this test's output.
-int run(const std::string& command) {
-  const int status = std::system(command.c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 struct Recording {
   std::string name;    // also the run's name in conditions
@@ -30,29 +23,22 @@ struct Recording {
   bool may_say_nothing = false;  // no valid pose at all is as right an answer
 };
 
-std::string with_data(std::string text) {
-  const std::size_t at = text.find("{}");
-  return at == std::string::npos ? text : text.replace(at, 2, kData.string());
-}
-
 class RecordedAccuracy : public testing::TestWithParam<Recording> {};
 
 TEST_P(RecordedAccuracy, HoldsThePeersFigures) {
   const Recording& r = GetParam();
   if (!fs::exists(kData / r.folder)) GTEST_SKIP() << "no recording " << (kData / r.folder);
-  const fs::path work = fs::path(testing::TempDir()) / ("farpoint_recorded_" + r.name);
-  fs::remove_all(work);
-  fs::create_directories(work);
-  const std::string log = (work / "recording.lcm").string(), out = (work / (r.name + ".lcm")).string();
+  const WorkFolder work("recorded_" + r.name);
+  const std::string log = work.file("recording.lcm"), out = work.file(r.name + ".lcm");
   ASSERT_EQ(run((kBin / "farpoint").string() + " import " + with_data(r.import) + " -o " + log), 0);
   ASSERT_EQ(run((kBin / "farpointd").string() + " --replay " + log + " --lockstep --output " + out), 0);
   const std::string evaluate =
       (kBin / "farpoint").string() + " evaluate " + out + " --truth " + log + " " + r.evaluate;
   std::string command = evaluate;
+  command += " --expect '" + r.name + ".peak_resident_mb <= 200'";
   for (const std::string& e : r.expect) command += " --expect '" + r.name + "." + e + "'";
   const bool silent = r.may_say_nothing && run(evaluate + " --expect '" + r.name + ".live.n <= 3'") == 0;
   EXPECT_TRUE(silent || run(command) == 0) << command;
-  fs::remove_all(work);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -89,3 +75,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const testing::TestParamInfo<Recording>& info) { return info.param.name; });
 
 }  // namespace
+}  // namespace farpoint::test

@@ -134,6 +134,7 @@ void write_run_log(const fs::path& file, const MadeRun& run) {
     if (!run.tracking_timed)
       std::swap(timing.cpu_ms[timing_t::STAGE_TRACKING], timing.cpu_ms[timing_t::STAGE_FRAME]);
     timing.deadline_missed = i == 5 ? 1 : 0;
+    timing.peak_resident_bytes = 1'000'000 * (100 + i);
     log.write_message(ipc::kTimingChannel, pose.utime, timing);
   }
   if (run.ended) {
@@ -171,6 +172,7 @@ TEST_F(EvaluateRun, GivesTheRowOfMethod) {
   EXPECT_NEAR(*m.tracked_percent, 100.0 * 191 / 201, 1e-9);
   EXPECT_EQ(*m.resets, 3);
   EXPECT_EQ(*m.deadline_misses, 1);
+  EXPECT_NEAR(*m.peak_resident_mb, 300.0, 1e-9);
   EXPECT_EQ(*m.map_points, 1234);
   EXPECT_NEAR(*m.vmp_percent, 5.0, 1e-9);
   ASSERT_TRUE(m.depth.has_value());  // metres are twice the map's units; the uncertain point does not count

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <memory>
 
 #include "ipc/channels.h"
@@ -107,7 +108,7 @@ class RunCollector {
     if (event.channel == ipc::kPoseChannel) return add_pose(event);
     if (event.channel == ipc::kTimingChannel) return add_timing(event);
     if (event.channel == ipc::kTrajectoryChannel) return add_trajectory(event);
-    if (event.channel == ipc::kLandmarksChannel) return ipc::decode(event.data, &log_.landmarks.emplace());
+    if (event.channel == ipc::kLandmarksChannel) return add_landmarks(event);
     if (event.channel == ipc::kSummaryChannel) return add_summary(event);
     return true;
   }
@@ -122,6 +123,18 @@ class RunCollector {
   }
 
  private:
+  bool add_landmarks(const ipc::LogEvent& event) {
+    landmarks_t message;
+    if (!ipc::decode(event.data, &message)) return false;
+    if (!log_.landmarks) {
+      log_.landmarks = std::move(message);
+      return true;
+    }
+    auto& all = log_.landmarks->landmarks;
+    std::move(message.landmarks.begin(), message.landmarks.end(), std::back_inserter(all));
+    log_.landmarks->nlandmarks = static_cast<std::int32_t>(all.size());
+    return true;
+  }
   bool add_pose(const ipc::LogEvent& event) {
     pose_t message;
     if (!ipc::decode(event.data, &message)) return false;
@@ -143,6 +156,7 @@ class RunCollector {
     const double frame_ms = message.cpu_ms[timing_t::STAGE_FRAME];
     if (frame_ms >= 0.0) log_.frame_ms.push_back(frame_ms);
     if (message.deadline_missed != 0) ++log_.deadline_misses;
+    log_.peak_resident_bytes = std::max(log_.peak_resident_bytes, message.peak_resident_bytes);
     return true;
   }
   bool add_trajectory(const ipc::LogEvent& event) {

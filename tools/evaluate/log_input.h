@@ -42,6 +42,7 @@ struct RunLog {
   std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
   std::vector<double> frame_ms;     // the same of the whole frame, mapping included where it runs in step
   std::int64_t deadline_misses = 0;
+  std::int64_t peak_resident_bytes = 0;  // 0: not told
 };
 // Throws InputError where the file cannot be read or holds neither FARPOINT_TRAJECTORY nor FARPOINT_POSE.
 [[nodiscard]] RunLog read_run_log(const std::filesystem::path& file);

@@ -286,6 +286,8 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
   metrics.frame_ms = run.log->frame_ms;
   if (!run.log->tracking_ms.empty() || !run.log->frame_ms.empty())
     metrics.deadline_misses = run.log->deadline_misses;
+  if (run.log->peak_resident_bytes > 0)
+    metrics.peak_resident_mb = 1e-6 * static_cast<double>(run.log->peak_resident_bytes);
   if (run.log->summary) add_summary(*run.log->summary, &metrics);
   if (truth.world) add_landmarks(*run.log, truth_at_point, truth.world.get(), &metrics);
   return metrics;
@@ -306,6 +308,7 @@ Json to_json(const RunMetrics& metrics) {
   json.set("tracking_ms", times_to_json(metrics.tracking_ms));
   json.set("frame_ms", times_to_json(metrics.frame_ms));
   json.set("deadline_misses", or_null(metrics.deadline_misses));
+  json.set("peak_resident_mb", or_null(metrics.peak_resident_mb));
   json.set("triangulation_depth_m", metrics.depth ? to_json(metrics.depth->triangulation_m) : Json());
   json.set("depth_over_50_m_percent", metrics.depth ? Json(metrics.depth->over_50_m_percent) : Json());
   json.set("depth_over_100_m_percent", metrics.depth ? Json(metrics.depth->over_100_m_percent) : Json());

@@ -105,6 +105,7 @@ struct RunMetrics {
       tracking_ms;               // thread CPU time of tracking; empty where the run did not measure it alone
   std::vector<double> frame_ms;  // of a whole frame: in lockstep, tracking and mapping
   std::optional<std::int64_t> deadline_misses;
+  std::optional<double> peak_resident_mb;  // of the process, up to the last frame; 10^6 bytes
   std::optional<DepthMetrics> depth;
   std::optional<std::int64_t> map_points;
   std::optional<double> vmp_percent;         // points made through a virtual map point, of all points made
