@@ -168,7 +168,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   add_options(&app, &parsed);
   CommandLine result;
   try {
-    app.parse(argc, const_cast<char**>(argv));
+    app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     result.text_and_leave = app.help();
     return result;

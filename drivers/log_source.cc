@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <span>
+#include <utility>
 
 #include "ipc/channels.h"
 
@@ -40,16 +42,27 @@ int camera_of(std::string_view channel) {
   return error == std::errc{} && end == digits.data() + digits.size() ? camera : -1;
 }
 
+// Between two times, the later one second; the longest there is where it does not fit.
+std::int64_t step_us(std::int64_t from, std::int64_t to) {
+  const std::uint64_t step = static_cast<std::uint64_t>(to) - static_cast<std::uint64_t>(from);
+  constexpr std::int64_t kLongest_us = std::numeric_limits<std::int64_t>::max() / 4;
+  return static_cast<std::int64_t>(std::min(step, static_cast<std::uint64_t>(kLongest_us)));
+}
+
 }  // namespace
 
 bool LogSource::next(LogItem* item) {
+  *item = {};
+  if (const int camera = std::exchange(waiting_camera_, -1); camera >= 0)
+    if (judge_image(camera, waiting_offset_, item)) return true;
   ipc::LogEvent event;
   while (reader_.next(&event)) {
     *item = {};
     item->offset = event.offset;
     if (take(event, item)) return true;
   }
-  return false;
+  *item = {};
+  return give_held_at_end(item);
 }
 
 bool LogSource::take(const ipc::LogEvent& event, LogItem* item) {
@@ -100,13 +113,68 @@ bool LogSource::take_image(int camera, const ipc::LogEvent& event, LogItem* item
       return false;
     }
   }
-  if (!accept_time(image_.utime, true, &camera_streams_[static_cast<std::size_t>(camera)])) return false;
+  return judge_image(camera, event.offset, item);
+}
+
+// Gives image_ out, or the held one before it, or nothing.
+bool LogSource::judge_image(int camera, std::uint64_t offset, LogItem* item) {
+  CameraStream& s = camera_streams_[static_cast<std::size_t>(camera)];
+  const std::int64_t utime = image_.utime;
+  if (s.last != Stream::kNone && utime <= s.last) {
+    ++counts_.times_backwards;
+    return false;
+  }
+  if (s.holds && utime >= s.held.utime) {
+    s.holds = false;
+    if (utime == s.held.utime) {
+      ++counts_.times_backwards;  // the same once more bears it out too
+    } else {
+      waiting_camera_ = camera;
+      waiting_offset_ = offset;
+    }
+    give_image(&s.held, camera, s.held_offset, item);
+    return true;
+  }
+  if (std::exchange(s.holds, false)) ++counts_.times_backwards;
+  if (s.pace_us == 0 || step_us(s.last, utime) > s.pace_us + s.pace_us / 2) {
+    std::swap(s.held, image_);
+    s.held_offset = offset;
+    s.holds = true;
+    return false;
+  }
+  give_image(&image_, camera, offset, item);
+  return true;
+}
+
+void LogSource::give_image(image_t* image, int camera, std::uint64_t offset, LogItem* item) {
+  CameraStream& s = camera_streams_[static_cast<std::size_t>(camera)];
+  std::swap(given_, *image);
+  if (s.last != Stream::kNone) {
+    // A slower pace shows itself at once, a gap is none.
+    const std::int64_t step = step_us(s.last, given_.utime);
+    s.pace_us = s.pace_us == 0 ? step : std::clamp(step, s.pace_us * 7 / 8, s.pace_us * 2);
+  }
+  s.last = given_.utime;
   ++counts_.images;
   item->kind = LogItemKind::kImage;
-  item->utime = image_.utime;
+  item->utime = given_.utime;
+  item->offset = offset;
   item->camera = camera;
-  item->image = &image_;
-  return true;
+  item->image = &given_;
+}
+
+// What no later image can bear out any more.
+bool LogSource::give_held_at_end(LogItem* item) {
+  for (int camera = 0; camera < kMaxCameras; ++camera) {
+    CameraStream& s = camera_streams_[static_cast<std::size_t>(camera)];
+    if (!std::exchange(s.holds, false)) continue;
+    if (s.last == Stream::kNone || step_us(s.last, s.held.utime) <= kMaxLeap_us) {
+      give_image(&s.held, camera, s.held_offset, item);
+      return true;
+    }
+    ++counts_.times_backwards;
+  }
+  return false;
 }
 
 bool LogSource::take_imu(const ipc::LogEvent& event, LogItem* item) {
@@ -147,17 +215,27 @@ bool LogSource::take_calibration(const ipc::LogEvent& event, LogItem* item) {
   if (!decode_message(event, &calibration)) return false;
   calibration_ = std::move(calibration);
   has_calibration_ = true;
-  // So that no image of usual size makes the message's buffer grow later.
-  constexpr std::int64_t kMostReserved = std::int64_t{8} << 20;
-  for (const camera_calibration_t& camera : calibration_.cameras) {
-    const std::int64_t pixels = std::int64_t{std::max(camera.width, 0)} * std::max(camera.height, 0);
-    image_.data.reserve(static_cast<std::size_t>(std::min(pixels, kMostReserved)));
-  }
+  reserve_images();
   ++counts_.calibrations;
   item->kind = LogItemKind::kCalibration;
   item->utime = calibration_.utime;
   item->calibration = &calibration_;
   return true;
+}
+
+// So that no image of usual size makes a message's buffer grow later.
+void LogSource::reserve_images() {
+  constexpr std::int64_t kMostReserved = std::int64_t{8} << 20;
+  std::size_t most = 0;
+  for (std::size_t c = 0; c < std::min(calibration_.cameras.size(), camera_streams_.size()); ++c) {
+    const camera_calibration_t& camera = calibration_.cameras[c];
+    const std::int64_t pixels = std::int64_t{std::max(camera.width, 0)} * std::max(camera.height, 0);
+    const auto bytes = static_cast<std::size_t>(std::min(pixels, kMostReserved));
+    camera_streams_[c].held.data.reserve(bytes);
+    most = std::max(most, bytes);
+  }
+  // The buffers change places, so all are as large as the largest.
+  for (image_t* image : {&image_, &given_}) image->data.reserve(most);
 }
 
 bool LogSource::take_ground_truth(const ipc::LogEvent& event, LogItem* item) {

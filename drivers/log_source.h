@@ -26,7 +26,7 @@ struct LogSourceCounts {
   std::uint64_t images_wrong_size = 0;  // not the calibration's, or not what the message itself says
   std::uint64_t images_undecodable = 0;  // damaged JPEG or PNG, unknown pixel format
   std::uint64_t times_backwards =
-      0;  // not after the one before it, or a leap that the next one does not bear out
+      0;  // not after the one before it, or a leap ahead that what follows does not bear out
   std::uint64_t imu_invalid = 0;            // not finite, or beyond any sensor's range
   std::uint64_t wheels_invalid = 0;         // infinite
   std::uint64_t ground_truths_invalid = 0;  // not finite, or no rotation
@@ -53,15 +53,17 @@ struct LogItem {
 class LogSource {
  public:
   static constexpr int kMaxCameras = 8;
-  // A camera or IMU that leaps further ahead than this is believed only with its next message: one damaged
-  // time must not make all that follow look old.
+  // An IMU that leaps further ahead than this is believed only with its next message: one damaged time must
+  // not make all that follow look old. An image is held back already where it comes late by half of the
+  // camera's pace, until the next one bears it out or not; at the end of the log it is believed up to this
+  // leap.
   static constexpr std::int64_t kMaxLeap_us = 2'000'000;
 
   // "-" is standard input. Throws std::runtime_error naming the log where it cannot be opened.
   explicit LogSource(const std::string& path) : reader_(path) {}
 
-  // The next measurement that passes the checks; false at the end. From the first calibration on, images are
-  // held against it.
+  // The next measurement that passes the checks, images that were held back behind what came between; false
+  // at the end. From the first calibration on, images are held against it.
   [[nodiscard]] bool next(LogItem* item);
   // Decodes an image item; counts it where it fails. Precondition: next() has not been called since.
   [[nodiscard]] ipc::ImageStatus decode(const LogItem& item, ipc::GreyImage* image);
@@ -78,7 +80,20 @@ class LogSource {
     std::int64_t doubtful = kNone;  // leapt ahead, not yet borne out
   };
 
+  // Images of one camera.
+  struct CameraStream {
+    std::int64_t last = Stream::kNone;  // given out last
+    std::int64_t pace_us = 0;           // between two of them; 0: not known yet
+    bool holds = false;                 // held, not yet borne out
+    image_t held{};
+    std::uint64_t held_offset = 0;
+  };
+
   bool accept_time(std::int64_t utime, bool check_leap, Stream* stream);
+  bool judge_image(int camera, std::uint64_t offset, LogItem* item);
+  void give_image(image_t* image, int camera, std::uint64_t offset, LogItem* item);
+  bool give_held_at_end(LogItem* item);
+  void reserve_images();
   bool take(const ipc::LogEvent& event, LogItem* item);
   bool take_image(int camera, const ipc::LogEvent& event, LogItem* item);
   bool take_imu(const ipc::LogEvent& event, LogItem* item);
@@ -91,11 +106,13 @@ class LogSource {
   ipc::LogReader reader_;
   ipc::ImageDecoder decoder_;
   LogSourceCounts counts_;
-  std::array<Stream, kMaxCameras> camera_streams_;
+  std::array<CameraStream, kMaxCameras> camera_streams_;
+  int waiting_camera_ = -1;  // image_ is this camera's, and comes after the held one that it bore out
+  std::uint64_t waiting_offset_ = 0;
   Stream imu_stream_, wheels_stream_, ground_truth_stream_;
   bool has_calibration_ = false;
   // Reused from message to message.
-  image_t image_{};
+  image_t image_{}, given_{};
   imu_t imu_{};
   wheels_t wheels_{};
   calibration_t calibration_{};

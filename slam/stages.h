@@ -24,13 +24,11 @@ enum class Stage : std::uint8_t {
 
 class StageListener {
  public:
+  virtual ~StageListener() = default;
   // Stages nest, and may run several times in a frame. Called on the hot path: must neither wait nor
   // allocate.
   virtual void begin(Stage stage) = 0;
   virtual void end(Stage stage) = 0;
-
- protected:
-  ~StageListener() = default;
 };
 
 // A stage for as long as it lives. A null listener is nobody.

@@ -2,16 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace farpoint::slam {
 
 namespace {
 
-// A pose that a third of the matched landmarks contradict is published, but not as valid. Rigid scenes show
-// 0.7 and more.
-constexpr double kMinAgreement = 0.65;
-// Frames of trying to find the way back before a new map is begun.
+// Frames and time of trying to find the way back before a new map is begun; frames that show nothing are no
+// tries.
 constexpr int kRelocalisationFrames = 15;
+constexpr std::int64_t kRelocalisation_us = 1'500'000;
+// Where so many frames in a row are missing, the next one does not go on where the last one was, it has to be
+// found.
+constexpr int kGapFrames = 4;
 // A map this young is dropped rather than kept when it is lost: its unit has not settled.
 constexpr int kYoungMapKeyframes = 5;
 constexpr int kGridCell_px = 24;
@@ -45,6 +48,23 @@ std::size_t pyramid_count(const EstimatorConfig& config) {
       static_cast<std::size_t>(std::min(0.25 * config.initialisation.max_frames, history)) + 4;
   const std::size_t building = static_cast<std::size_t>(config.capacity.window_images) + 3;
   return std::max(looking, building) + kInHand + kOverlap;
+}
+
+// Tells images apart. Two shots of one scene differ by their noise; equal pixels are one shot sent twice.
+std::uint64_t pixel_hash(const ImageView& image) {
+  constexpr std::uint64_t kPrime = 0x9E3779B97F4A7C15ULL;  // odd, bits well mixed: 2^64 over the golden ratio
+  const auto width = static_cast<std::size_t>(image.width_px);
+  std::uint64_t hash = kPrime;
+  for (int y = 0; y < image.height_px; ++y) {
+    const std::uint8_t* row = image.data + static_cast<std::ptrdiff_t>(y) * image.stride_bytes;
+    for (std::size_t x = 0; x < width; x += sizeof(std::uint64_t)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, row + x, std::min(sizeof(word), width - x));
+      hash = (hash ^ word) * kPrime;
+      hash ^= hash >> 32;
+    }
+  }
+  return hash;
 }
 
 }  // namespace
@@ -122,6 +142,14 @@ const FrameResult& TrackingSide::track(const FrameInput& input, const ReplyLimit
   const std::shared_ptr<Frame> frame = take_frame(input.utime, input.sequence, input.camera);
   const std::shared_ptr<PyramidFrame> pixels = pyramids_.take();
   if (!frame || !pixels) return reject(input.utime);
+  const std::uint64_t hash = pixel_hash(input.image);
+  if (std::exchange(image_hash_, hash) == hash) {
+    // A camera that hangs says nothing of where it is now.
+    frame->set.features.clear();
+    frame->set.descriptors.clear();
+    frame->grid.build(frame->set.features);
+    return step(frame, limit);
+  }
   {
     const StageSpan span(listener_, Stage::kPyramid);
     pixels->pyramid.build(input.image);
@@ -155,11 +183,16 @@ const FrameResult& TrackingSide::step(const std::shared_ptr<Frame>& frame, const
   result_.sequence = frame->sequence;
   result_.features = static_cast<int>(frame->set.features.size());
   take_replies(frame->number, limit);
-  if (state_ == State::kInitialising)
-    initialise(frame);
-  else
+  const bool blind = result_.features < config_.tracking.min_inliers;
+  if (state_ == State::kInitialising) {
+    if (!blind) initialise(frame);
+  } else if (blind) {
+    see_nothing();
+  } else {
     follow(frame);
-  result_.state = state_;
+  }
+  if (!blind) note_interval(frame->utime);
+  result_.state = blind && state_ != State::kInitialising ? State::kLost : state_;
   result_.map_id = map_id_;
   result_.reset_counter = resets_;
   result_.jobs_under_way = static_cast<int>(jobs_under_way_);
@@ -236,6 +269,7 @@ void TrackingSide::begin_map(const MappingReply& reply) {
   ++resets_;
   settled_ = false;
   lost_frames_ = 0;
+  trial_.reset();
   frames_since_keyframe_ = 0;
   tracker_.start(view.T_world_reference, second->utime);
   tracker_.set_view(reply.view);
@@ -244,8 +278,9 @@ void TrackingSide::begin_map(const MappingReply& reply) {
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == first || f == second; });
   for (const auto& f : waiting_) f->image.reset();
-  record(first->utime, view.keyframes.front().id, SE3{});
-  record(second->utime, view.reference_id, view.T_world_reference.inverse() * view.T_world_reference);
+  record({first->utime, map_id_, view.keyframes.front().id, SE3{}});
+  record(
+      {second->utime, map_id_, view.reference_id, view.T_world_reference.inverse() * view.T_world_reference});
   initialiser_.clear();
   state_ = State::kSettling;
   fill_pose(view.T_world_reference, Matrix6d::Zero());
@@ -308,27 +343,66 @@ void TrackingSide::initialise(const std::shared_ptr<Frame>& frame) {
 // --- tracking
 // ---------------------------------------------------------------------------------------------------
 
+// A frame without a picture is as none: what follows it is found again by the time that has gone by.
+void TrackingSide::see_nothing() {
+  result_.has_pose = false;
+  result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
+}
+
+// The camera's own pace, which a gap is measured in. A slower one is learnt at once, a faster one within some
+// frames: a frame that was doubled is no pace.
+void TrackingSide::note_interval(std::int64_t utime) {
+  if (seen_utime_ != kNever) {
+    const std::int64_t now_us = utime - seen_utime_;
+    interval_us_ = interval_us_ == 0 ? now_us : std::clamp(now_us, interval_us_ * 7 / 8, 2 * interval_us_);
+  }
+  seen_utime_ = utime;
+}
+
+bool TrackingSide::after_gap(std::int64_t utime) const {
+  return interval_us_ > 0 && utime - seen_utime_ > kGapFrames * interval_us_;
+}
+
 void TrackingSide::follow(const std::shared_ptr<Frame>& frame) {
   result_.has_pose = false;  // begin_map() has left the pair's
-  const bool was_lost = state_ == State::kLost || state_ == State::kRelocalising;
-  const TrackOutcome outcome = was_lost ? tracker_.relocalise(*frame) : tracker_.track(*frame);
+  const bool on_trial = trial_.has_value() && !after_gap(frame->utime);
+  const bool searching =
+      !on_trial && (state_ == State::kLost || state_ == State::kRelocalising || after_gap(frame->utime));
+  const std::optional<RecordedFrame> tried = std::exchange(trial_, std::nullopt);
+  const TrackOutcome outcome = searching ? tracker_.relocalise(*frame) : tracker_.track(*frame);
   result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
   result_.matches = outcome.matches;
   result_.inliers = outcome.inliers;
   result_.aligned = outcome.aligned;
-  if (!outcome.ok || outcome.inliers < config_.tracking.min_inliers) {
+  if (!outcome.ok || outcome.inliers < config_.tracking.min_inliers || (on_trial && !outcome.agreed())) {
     lose(frame);
     return;
   }
+  if (searching) {
+    try_out(*frame, outcome);
+    return;
+  }
+  if (on_trial) record(*tried);
+  go_on(frame, outcome);
+}
+
+// A place that was searched for is told of once the next frame goes on from there.
+void TrackingSide::try_out(const Frame& frame, const TrackOutcome& outcome) {
+  if (state_ != State::kLost && state_ != State::kRelocalising) ++counts_.lost;
+  has_last_ = false;
+  state_ = State::kRelocalising;
+  tracker_.accept_on_trial(frame, outcome);
+  trial_ = place(frame, outcome);
+}
+
+void TrackingSide::go_on(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
   lost_frames_ = 0;
-  tracker_.accept(*frame, outcome, !was_lost);
-  record(frame->utime, tracker_.view()->reference_id,
-         tracker_.view()->T_world_reference.inverse() * outcome.T_world_body);
+  tracker_.accept(*frame, outcome);
+  record(place(*frame, outcome));
   ++frames_since_keyframe_;
   maybe_keyframe(frame, outcome);
   if (settled_ && !waiting_.empty()) pose_waiting();
-  const bool agreed = outcome.inliers >= kMinAgreement * outcome.matches;
-  if (!settled_ || !agreed)
+  if (!settled_ || !outcome.agreed())
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
@@ -340,11 +414,13 @@ void TrackingSide::follow(const std::shared_ptr<Frame>& frame) {
 void TrackingSide::lose(const std::shared_ptr<Frame>& frame) {
   if (state_ != State::kLost && state_ != State::kRelocalising) ++counts_.lost;
   has_last_ = false;
-  ++lost_frames_;
+  if (++lost_frames_ == 1) lost_since_utime_ = frame->utime;
   const int keyframes = tracker_.view() != nullptr ? tracker_.view()->map_keyframes : 0;
   const bool young = !settled_ || keyframes < kYoungMapKeyframes;
   state_ = lost_frames_ == 1 ? State::kLost : State::kRelocalising;
-  if (!young && lost_frames_ <= kRelocalisationFrames) return;
+  const bool tried_enough =
+      lost_frames_ > kRelocalisationFrames && frame->utime - lost_since_utime_ > kRelocalisation_us;
+  if (!young && !tried_enough) return;
   // Begin anew, beside the old map where that is worth keeping. Where mapping cannot take the job now, the
   // old map stays as it is.
   if (begin_job(young ? MappingJobKind::kDiscardMap : MappingJobKind::kRetireMap) != nullptr) end_job();
@@ -400,9 +476,13 @@ void TrackingSide::take_counts() {
   }
 }
 
-void TrackingSide::record(std::int64_t utime, std::uint64_t reference_id, const SE3& T_reference_body) {
-  if (!exchange_.recorded.push({utime, map_id_, reference_id, T_reference_body}))
-    ++counts_.frames_not_recorded;
+RecordedFrame TrackingSide::place(const Frame& frame, const TrackOutcome& outcome) const {
+  return {frame.utime, map_id_, tracker_.view()->reference_id,
+          tracker_.view()->T_world_reference.inverse() * outcome.T_world_body};
+}
+
+void TrackingSide::record(const RecordedFrame& frame) {
+  if (!exchange_.recorded.push(frame)) ++counts_.frames_not_recorded;
 }
 
 void TrackingSide::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -68,11 +70,17 @@ class TrackingSide {
   void end_job();
 
   void initialise(const std::shared_ptr<Frame>& frame);
+  void see_nothing();
+  void note_interval(std::int64_t utime);
+  [[nodiscard]] bool after_gap(std::int64_t utime) const;
   void follow(const std::shared_ptr<Frame>& frame);
+  void try_out(const Frame& frame, const TrackOutcome& outcome);
+  void go_on(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void lose(const std::shared_ptr<Frame>& frame);
   void maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void pose_waiting();
-  void record(std::int64_t utime, std::uint64_t reference_id, const SE3& T_reference_body);
+  [[nodiscard]] RecordedFrame place(const Frame& frame, const TrackOutcome& outcome) const;
+  void record(const RecordedFrame& frame);
   void fill_pose(const SE3& T_map_body, const Matrix6d& covariance);
 
   const EstimatorConfig config_;
@@ -92,6 +100,7 @@ class TrackingSide {
   std::uint64_t frame_number_ = 0;  // of the next frame
   std::int64_t last_utime_ = 0;
   bool any_frame_ = false;
+  std::uint64_t image_hash_ = 0;  // of the last image
 
   std::int32_t map_id_ = 0;
   std::uint64_t jobs_ = 0;              // sent
@@ -100,7 +109,12 @@ class TrackingSide {
   std::uint64_t busy_until_frame_ = 0;  // lockstep: a new map's first view costs mapping so long
   std::shared_ptr<Frame> start_first_, start_second_;  // the pair that a map is being made from
   int frames_since_keyframe_ = 0;
-  int lost_frames_ = 0;
+  int lost_frames_ = 0;  // that were searched in vain
+  std::int64_t lost_since_utime_ = 0;
+  std::optional<RecordedFrame> trial_;  // a place found again, which the next frame has to bear out
+  // Of frames that showed something.
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+  std::int64_t seen_utime_ = kNever, interval_us_ = 0;
   bool settled_ = false;
   // Frames from before the map, posed once it has settled.
   std::vector<std::shared_ptr<Frame>> waiting_;

@@ -13,7 +13,18 @@ constexpr double kMinViewCosine = 0.5;  // 60 degrees from the anchor's view a p
 // Sizes beyond these cannot be matched: the patch has no pixels left, or too few.
 constexpr float kMinScaleChange = 0.3F, kMaxScaleChange = 3.3F;
 
-constexpr std::uint32_t kNotInView = 0xFFFFFFFFU;
+// Longer after the last frame its motion says nothing any more: of a frame that is tracked, and of the way
+// back after a gap.
+constexpr double kLongestStep_s = 1.0, kLongestGap_s = 3.0;
+// After a gap a turn by so much was not foreseen: a vehicle sways by degrees and begins or ends its turns.
+constexpr double kTurnOpen_rad = 0.03, kTurnOpen_rad_per_s = 0.12, kMostTurnOpen_rad = 0.3;
+constexpr double kArcStep_s = 0.1;
+// Among the corners of a wide window the second best is often nearly as good.
+constexpr float kPairRatio = 0.8F;
+
+double seconds_between(std::int64_t from_utime, std::int64_t to_utime) {
+  return static_cast<double>(to_utime - from_utime) * 1e-6;
+}
 
 // Room for so many, in memory that has been written to.
 template <typename T>
@@ -42,10 +53,12 @@ Tracker::Tracker(const EstimatorConfig& config) : config_(config) {
   touch(&feature_match_, features);
   touch(&measurements_, features);
   touch(&last_seen_, features);
+  touch(&sure_seen_, features);
   touch(&seen_last_frame_, in_view);
   touch(&matched_, in_view);
   touch(&candidate_of_, in_view);
   touch(&motions_, features);
+  touch(&pairs_, in_view);
   touch(&bearings_, in_view);
   touch(&points_, in_view);
   pnp_.reserve(in_view);
@@ -58,10 +71,10 @@ Tracker::Tracker(const EstimatorConfig& config) : config_(config) {
 
 std::size_t Tracker::bytes() const {
   return capacity_bytes(candidates_) + capacity_bytes(matches_) + capacity_bytes(feature_match_) +
-         capacity_bytes(measurements_) + capacity_bytes(last_seen_) + capacity_bytes(seen_last_frame_) +
+         capacity_bytes(measurements_) + 2 * capacity_bytes(last_seen_) + capacity_bytes(seen_last_frame_) +
          capacity_bytes(matched_) + capacity_bytes(candidate_of_) + capacity_bytes(motions_) +
-         capacity_bytes(bearings_) + 2 * capacity_bytes(points_) + capacity_bytes(pnp_.use) +
-         capacity_bytes(pnp_.result.inlier) + capacity_bytes(counted_slots_) +
+         capacity_bytes(pairs_) + capacity_bytes(bearings_) + 2 * capacity_bytes(points_) +
+         capacity_bytes(pnp_.use) + capacity_bytes(pnp_.result.inlier) + capacity_bytes(counted_slots_) +
          capacity_bytes(view_index_of_slot_) + capacity_bytes(counts_);
 }
 
@@ -72,7 +85,8 @@ void Tracker::set_view(std::shared_ptr<const LocalView> view) {
       const auto now = std::find_if(view->keyframes.begin(), view->keyframes.end(),
                                     [&](const ViewKeyframe& k) { return k.id == old->id; });
       if (now == view->keyframes.end()) continue;
-      T_world_body_ = now->T_world_body * (old->T_world_body.inverse() * T_world_body_);
+      const SE3 T_new_old = now->T_world_body * old->T_world_body.inverse();
+      for (Motion* m : {&now_, &sure_}) m->T_world_body = T_new_old * m->T_world_body;
       break;
     }
   }
@@ -97,22 +111,25 @@ void Tracker::mark_seen(std::span<const LandmarkHandle> seen) {
 }
 
 void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
-  T_world_body_ = T_world_body;
-  utime_ = utime;
-  velocity_.setZero();
-  has_velocity_ = false;
+  now_ = {.T_world_body = T_world_body, .utime = utime};
+  sure_ = now_;
   last_seen_.clear();
+  sure_seen_.clear();
   view_.reset();
   for (const std::uint32_t slot : counted_slots_) counts_[slot] = {};
   counted_slots_.clear();
 }
 
 SE3 Tracker::predict_pose(std::int64_t utime) const {
-  if (!has_velocity_) return T_world_body_;
-  const double dt_s = static_cast<double>(utime - utime_) * 1e-6;
-  // Beyond a second the last motion says nothing any more.
-  if (dt_s <= 0.0 || dt_s > 1.0) return T_world_body_;
-  return T_world_body_.boxplus(velocity_ * dt_s);
+  if (!now_.has_velocity) return now_.T_world_body;
+  const double dt_s = seconds_between(now_.utime, utime);
+  if (dt_s <= 0.0 || dt_s > kLongestStep_s) return now_.T_world_body;
+  return now_.T_world_body.boxplus(now_.velocity * dt_s);
+}
+
+bool Tracker::is_among(std::size_t view_index, Among among) const {
+  if (among == Among::kAll || seen_last_frame_[view_index] != 0) return true;
+  return among == Among::kRecent && view_->landmarks[view_index].in_reference;
 }
 
 void Tracker::project_view(const Frame& frame, const SE3& T_world_body, Among among,
@@ -123,7 +140,7 @@ void Tracker::project_view(const Frame& frame, const SE3& T_world_body, Among am
   const Predictor predictor(camera.camera, (T_world_body * camera.T_body_camera).inverse());
   Candidate c;
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
-    if (among == Among::kLastFrame && seen_last_frame_[i] == 0) continue;
+    if (!is_among(i, among)) continue;
     const ViewLandmark& l = view_->landmarks[i];
     if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &c.prediction)) continue;
     if (c.prediction.view_cosine < kMinViewCosine || !scale_fits(c.prediction.scale_change)) continue;
@@ -132,6 +149,17 @@ void Tracker::project_view(const Frame& frame, const SE3& T_world_body, Among am
                               static_cast<float>(config_.pyramid.scale_factor), config_.pyramid.levels);
     out->push_back(c);
   }
+}
+
+Match Tracker::match_of(const Frame& frame, std::uint32_t view_index, std::int32_t feature) const {
+  const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
+  Match m;
+  m.view_index = view_index;
+  m.feature = feature;
+  m.pixel = {f.u_px, f.v_px};
+  m.sigma_px = static_cast<float>(level_scale_[f.level]);
+  m.inlier = true;
+  return m;
 }
 
 int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& candidates, double radius_px,
@@ -158,15 +186,8 @@ int Tracker::match_candidates(const Frame& frame, const std::vector<Candidate>& 
     const int feature =
         find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return feature_match_[f] < 0; });
     if (feature < 0) continue;
-    const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
-    Match m;
-    m.view_index = c.view_index;
-    m.feature = feature;
-    m.pixel = {f.u_px, f.v_px};
-    m.sigma_px = static_cast<float>(level_scale_[f.level]);
-    m.inlier = true;
     feature_match_[static_cast<std::size_t>(feature)] = static_cast<std::int32_t>(matches_.size());
-    matches_.push_back(m);
+    matches_.push_back(match_of(frame, c.view_index, feature));
     ++found;
   }
   return found;
@@ -309,56 +330,153 @@ TrackOutcome Tracker::track(const Frame& frame) {
 }
 
 TrackOutcome Tracker::track_from(const Frame& frame, const SE3& prior) {
-  feature_match_.assign(frame.set.features.size(), -1);
-  matches_.clear();
+  begin_matching(frame);
   if (!view_) return {};
   SE3 T = prior;
   if (!coarse_pose(frame, &T)) return {};
   return fine_pose(frame, T);
 }
 
-TrackOutcome Tracker::relocalise(const Frame& frame) {
+void Tracker::begin_matching(const Frame& frame) {
   feature_match_.assign(frame.set.features.size(), -1);
   matches_.clear();
+}
+
+// --- the way back
+// -----------------------------------------------------------------------------------------------
+
+// Going on as before, along the arc that the velocity describes.
+SE3 Tracker::gone_on(double gone_s) const {
+  SE3 T = sure_.T_world_body;
+  const int steps = static_cast<int>(std::ceil(gone_s / kArcStep_s));
+  for (int i = 0; i < steps; ++i) T = T.boxplus(sure_.velocity * (gone_s / steps));
+  return T;
+}
+
+TrackOutcome Tracker::relocalise(const Frame& frame) {
+  begin_matching(frame);
   if (!view_) return {};
+  mark_seen(sure_seen_);
   const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
-  bearings_.clear();
-  points_.clear();
+  const double gone_s = std::clamp(seconds_between(sure_.utime, frame.utime), 0.0, kLongestGap_s);
+  const double radius_px =
+      std::min(kTurnOpen_rad + kTurnOpen_rad_per_s * gone_s, kMostTurnOpen_rad) * camera.camera.focal_px();
+  const SE3 moved = gone_on(gone_s), stood = sure_.T_world_body;
+  struct Search {
+    Among among;
+    const SE3* around;
+  };
+  // Landmarks seen last are surely there; of the whole view many are hidden, and others look like them.
+  const Search searches[] = {{Among::kRecent, &moved},
+                             {Among::kRecent, &stood},
+                             {Among::kRecent, nullptr},
+                             {Among::kAll, &moved},
+                             {Among::kAll, nullptr}};
+  for (const Search& s : searches) {
+    if (s.around != nullptr)
+      pair_around(frame, *s.around, radius_px, s.among);
+    else
+      pair_anywhere(frame, s.among);
+    const TrackOutcome out = pose_from_pairs(frame);
+    if (out.ok) return out;
+  }
+  return {};
+}
+
+// Landmarks around where they would be seen from a pose.
+void Tracker::pair_around(const Frame& frame, const SE3& T_world_body, double radius_px, Among among) {
+  project_view(frame, T_world_body, among, &candidates_);
+  const StageSpan span(listener_, Stage::kMatching);
+  pairs_.clear();
   DescriptorQuery q;
-  q.u_px = static_cast<float>(camera.camera.width_px()) / 2;
-  q.v_px = static_cast<float>(camera.camera.height_px()) / 2;
+  q.radius_px = static_cast<float>(radius_px);
+  q.max_hamming = config_.tracking.max_hamming;
+  q.ratio = kPairRatio;
+  for (const Candidate& c : candidates_) {
+    q.u_px = static_cast<float>(c.prediction.pixel.x());
+    q.v_px = static_cast<float>(c.prediction.pixel.y());
+    // How far the vehicle went is open too, and with it the size.
+    q.min_level = c.level - 2;
+    q.max_level = c.level + 2;
+    pair_one(frame, c.view_index, q);
+  }
+}
+
+// The same in the whole image.
+void Tracker::pair_anywhere(const Frame& frame, Among among) {
+  const StageSpan span(listener_, Stage::kMatching);
+  const Camera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)].camera;
+  pairs_.clear();
+  DescriptorQuery q;
+  q.u_px = static_cast<float>(camera.width_px()) / 2;
+  q.v_px = static_cast<float>(camera.height_px()) / 2;
   q.radius_px = 1e6F;
   q.max_hamming = config_.tracking.max_hamming * 3 / 4;
   q.ratio = 0.75F;
   q.max_level = config_.pyramid.levels - 1;
-  for (const ViewLandmark& l : view_->landmarks) {
-    if (!l.confirmed || l.point_w[3] <= 0.0) continue;
-    q.descriptor = l.descriptor;
-    const int f = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; });
-    if (f < 0) continue;
-    const Feature& feature = frame.set.features[static_cast<std::size_t>(f)];
-    Eigen::Vector3d bearing;
-    if (!camera.camera.unproject({feature.u_px, feature.v_px}, &bearing)) continue;
-    bearings_.push_back(bearing);
-    points_.push_back(l.point_w.head<3>() / l.point_w[3]);
-  }
-  const PnpResult& pnp = solve_pnp(bearings_, points_, 2.0 / camera.camera.focal_px(), PnpOptions{}, &pnp_);
-  if (!pnp.ok) return {};
-  const SE3 T_world_body = (camera.T_body_camera * pnp.T_camera_world).inverse();
-  return track_from(frame, T_world_body);
+  for (std::size_t i = 0; i < view_->landmarks.size(); ++i)
+    if (is_among(i, among)) pair_one(frame, static_cast<std::uint32_t>(i), q);
 }
 
-void Tracker::accept(const Frame& frame, const TrackOutcome& outcome, bool continuous) {
-  const double dt_s = static_cast<double>(frame.utime - utime_) * 1e-6;
-  if (continuous && dt_s > 0.0 && dt_s < 1.0) {
-    velocity_ = T_world_body_.boxminus_to(outcome.T_world_body) / dt_s;
-    has_velocity_ = true;
-  } else {
-    velocity_.setZero();
-    has_velocity_ = false;
+void Tracker::pair_one(const Frame& frame, std::uint32_t view_index, const DescriptorQuery& query) {
+  const ViewLandmark& landmark = view_->landmarks[view_index];
+  if (!landmark.confirmed || landmark.point_w[3] <= 0.0) return;
+  DescriptorQuery q = query;
+  q.descriptor = landmark.descriptor;
+  const int feature = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; });
+  if (feature >= 0) pairs_.push_back({view_index, feature});
+}
+
+TrackOutcome Tracker::pose_from_pairs(const Frame& frame) {
+  const RigCamera& camera = view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
+  begin_matching(frame);
+  bearings_.clear();
+  points_.clear();
+  std::erase_if(pairs_, [&](const Pair& p) {
+    const Feature& f = frame.set.features[static_cast<std::size_t>(p.feature)];
+    Eigen::Vector3d bearing;
+    if (!camera.camera.unproject({f.u_px, f.v_px}, &bearing)) return true;
+    const Eigen::Vector4d& point = view_->landmarks[p.view_index].point_w;
+    bearings_.push_back(bearing);
+    points_.push_back(point.head<3>() / point[3]);
+    return false;
+  });
+  const PnpResult& pnp = solve_pnp(bearings_, points_, 2.0 / camera.camera.focal_px(), PnpOptions{}, &pnp_);
+  if (!pnp.ok) return {};
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (pnp.inlier[i] == 0) continue;
+    std::int32_t& taken = feature_match_[static_cast<std::size_t>(pairs_[i].feature)];
+    if (taken >= 0) continue;
+    taken = static_cast<std::int32_t>(matches_.size());
+    matches_.push_back(match_of(frame, pairs_[i].view_index, pairs_[i].feature));
   }
-  T_world_body_ = outcome.T_world_body;
-  utime_ = frame.utime;
+  const PoseSolution s = pose_from_matches(frame, (camera.T_body_camera * pnp.T_camera_world).inverse());
+  if (!s.ok) return {};
+  TrackOutcome out = fine_pose(frame, s.T_world_body);
+  out.ok = out.ok && out.inliers >= config_.tracking.min_inliers && out.agreed();
+  return out;
+}
+
+void Tracker::accept(const Frame& frame, const TrackOutcome& outcome) {
+  note_pose(frame, outcome, kLongestStep_s);
+  sure_ = now_;
+  sure_seen_.assign(last_seen_.begin(), last_seen_.end());
+}
+
+void Tracker::accept_on_trial(const Frame& frame, const TrackOutcome& outcome) {
+  now_ = sure_;
+  note_pose(frame, outcome, kLongestGap_s);
+}
+
+// Beyond `longest_s` since the last pose the mean motion says nothing of the present one.
+void Tracker::note_pose(const Frame& frame, const TrackOutcome& outcome, double longest_s) {
+  const double dt_s = seconds_between(now_.utime, frame.utime);
+  Motion m{.T_world_body = outcome.T_world_body, .utime = frame.utime};
+  if (dt_s > 0.0 && dt_s < longest_s) {
+    m.velocity = now_.T_world_body.boxminus_to(outcome.T_world_body) / dt_s;
+    m.has_velocity = true;
+  }
+  now_ = m;
   count_sightings();
 }
 

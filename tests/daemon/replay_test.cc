@@ -11,11 +11,11 @@
 #include <numbers>
 #include <sstream>
 
-#include "daemon/run.h"
 #include "ipc/candump.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "slam/geometry/se3.h"
+#include "tests/daemon/run_daemon.h"
 #include "tests/daemon/synthetic_log.h"
 #include "tests/ipc/dbc.h"
 #include "tests/ipc/scratch.h"
@@ -24,34 +24,11 @@ namespace farpoint::daemon {
 namespace {
 
 namespace fs = std::filesystem;
+using test::messages_of;
+using test::Outcome;
+using test::run_daemon;
 using test::SyntheticLog;
-
-struct Outcome {
-  int status = -1;
-  std::string out, err;
-  [[nodiscard]] long err_lines() const { return std::count(err.begin(), err.end(), '\n'); }
-};
-
-// Runs the daemon in this process; warnings and errors only on standard error.
-Outcome run_daemon(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "farpointd");
-  arguments.insert(arguments.end(), {"--set", "log.level=warning"});
-  std::vector<const char*> argv;
-  for (const std::string& a : arguments) argv.push_back(a.c_str());
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Outcome outcome;
-  outcome.status = run(static_cast<int>(argv.size()), argv.data());
-  std::fflush(stdout);
-  outcome.out = testing::internal::GetCapturedStdout();
-  outcome.err = testing::internal::GetCapturedStderr();
-  return outcome;
-}
-
-std::string text_of(const std::string& path) {
-  const auto bytes = test::read_bytes(path);
-  return {bytes.begin(), bytes.end()};
-}
+using test::text_of;
 
 // Says where two long texts differ instead of printing them.
 void expect_same(const std::string& a, const std::string& b, const std::string& what) {
@@ -206,19 +183,6 @@ class SyntheticRun : public testing::Test {
   static test::Scratch* scratch_;
 };
 test::Scratch* SyntheticRun::scratch_ = nullptr;
-
-template <typename Message>
-std::vector<Message> messages_of(const std::string& log, const std::string& channel) {
-  std::vector<Message> all;
-  ipc::LogReader reader(log);
-  ipc::LogEvent event;
-  while (reader.next(&event)) {
-    if (event.channel != channel) continue;
-    all.emplace_back();
-    EXPECT_TRUE(ipc::decode(event.data, &all.back())) << channel;
-  }
-  return all;
-}
 
 // Everything in a log but FARPOINT_TIMING, event headers included.
 std::string comparable(const std::string& log) {

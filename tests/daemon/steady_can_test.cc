@@ -18,6 +18,9 @@ namespace farpoint::daemon {
 namespace {
 
 class SteadyCan : public testing::Test {
+ public:
+  ~SteadyCan() override { close(bus_); }
+
  protected:
   SteadyCan() : sink_(CanPoseFrame::kOdom), dbc_(test::read_dbc(FARPOINT_SOURCE_DIR "/config/farpoint.dbc")) {
     std::array<int, 2> ends{};
@@ -33,7 +36,6 @@ class SteadyCan : public testing::Test {
     frame_.result.velocity_body << 10, 0, 0, 0, 0, 0;
     frame_.result.covariance = slam::Matrix6d::Identity() * 1e-4;
   }
-  ~SteadyCan() override { close(bus_); }
 
   // The epochs sent so far: each a value of every signal by "MESSAGE.SIGNAL".
   std::vector<std::map<std::string, double>> epochs() {

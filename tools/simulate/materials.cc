@@ -297,8 +297,7 @@ void MaterialLibrary::add_facades() {
       wall.rectangle(x, 0, x + 0.12, 9.6, 0.16F);
       for (int k = 0; k < 4; ++k) wall.rectangle(x - 0.04, 2.4 * k, x + 0.16, 2.4 * k + 0.07, 0.4F);
     }
-    materials_[static_cast<std::size_t>(kFirstFacade + i)].layers = {{add(wall.texture()), 12.0, 9.6, albedo},
-                                                                     detail(1.1)};
+    nth(kFirstFacade, i).layers = {{add(wall.texture()), 12.0, 9.6, albedo}, detail(1.1)};
   }
   for (int i = 0; i < kShops; ++i) {
     const std::uint64_t seed = seed_of(seed_, "shop") + static_cast<std::uint64_t>(i);
@@ -336,8 +335,7 @@ void MaterialLibrary::add_facades() {
       if (random.chance(0.5)) wall.rectangle(x + 0.15, 2.92, x + 0.22, 3.28, ink);
     }
     weather(&wall, seed + 1, 0.12);
-    materials_[static_cast<std::size_t>(kFirstShop + i)].layers = {{add(wall.texture()), 12.0, 3.6, albedo},
-                                                                   detail(1.1)};
+    nth(kFirstShop, i).layers = {{add(wall.texture()), 12.0, 3.6, albedo}, detail(1.1)};
   }
 }
 
@@ -414,7 +412,7 @@ void MaterialLibrary::add_plants() {
       const double base = value > 0.0F ? (value - 0.5) * 0.95 : 0.1;
       return clamped(0.02 + base * (1.0 + 0.5 * periodic_fractal(tone_seed, 1.5 * x, 1.5 * y, 6, 4, 0.7)));
     });
-    Material& material = materials_[static_cast<std::size_t>(kFirstFoliage + i)];
+    Material& material = nth(kFirstFoliage, i);
     material.layers = {{add(tone.texture()), 4.0, 4.0, albedo}};
     material.cutout = cutout;
   }
@@ -458,7 +456,7 @@ void MaterialLibrary::add_objects() {
                        0.31 + 0.42 * line + 0.1 * random.index(2), ink);
       }
     }
-    materials_[static_cast<std::size_t>(kFirstSign + i)].layers = {{add(sign.texture()), 2.0, 2.0, albedo}};
+    nth(kFirstSign, i).layers = {{add(sign.texture()), 2.0, 2.0, albedo}};
   }
   Canvas side(512, 128, 4.4, 1.5, 0.6F);
   side.rectangle(0, 0, 4.4, 0.18, 0.05F);

@@ -72,6 +72,10 @@ class MaterialLibrary {
   void add_plants();
   void add_objects();
   Layer detail(double period_m) const;
+  // Of several materials of a kind that follow `first`.
+  Material& nth(MaterialId first, int i) {
+    return materials_[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)];
+  }
 
   std::uint64_t seed_;
   std::vector<std::unique_ptr<Texture>> textures_;

@@ -16,7 +16,8 @@ struct TextureLevel {
   std::vector<std::uint8_t> texels;
 
   [[nodiscard]] std::uint8_t at(int x, int y) const {
-    return texels[static_cast<std::size_t>((y & (height - 1)) * stride + (x & (width - 1)))];
+    const int index = (y & (height - 1)) * stride + (x & (width - 1));
+    return texels[static_cast<std::size_t>(index)];
   }
 };
 

@@ -1,0 +1,96 @@
+// Half a second to two seconds without images, anywhere in a recording: the way back into the same map.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/replay/gaps.h"
+
+namespace farpoint::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kData = fs::path(FARPOINT_SOURCE_DIR) / ".." / "shared" / "data";
+
+struct Recording {
+  std::string name;
+  std::string folder;  // below the data folder
+  std::string import;  // `farpoint import`, {} stands for the data folder
+  double apart_s;      // between gaps of one replay: time to be back, and to be judged
+  double first_s;      // of the first gap: the map has settled
+};
+
+const Recording kKitti{"kitti03", "kitti", "kitti {} 03", 7.0, 4.0};
+const Recording kEuroc{"euroc", "euroc/MH_01_part", "euroc {}", 5.0, 3.0};
+
+struct Sum {
+  int places = 0, seen = 0, back = 0, poses = 0, wrong_poses = 0;
+};
+
+class RecordedGaps : public testing::TestWithParam<Recording> {
+ protected:
+  void SetUp() override {
+    const fs::path folder = kData / GetParam().folder;
+    if (!fs::exists(folder)) GTEST_SKIP() << "no recording " << folder;
+    log_ = fs::path(testing::TempDir()) / ("farpoint_gaps_" + GetParam().name + ".lcm");
+    std::string import = GetParam().import;
+    import.replace(import.find("{}"), 2, folder.string());
+    const std::string command = FARPOINT_BINARY_DIR "/bin/farpoint import " + import + " -o " + log_.string();
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  void TearDown() override { fs::remove(log_); }
+
+  // `places` gaps up to `until_s`.
+  Sum run(int places, double until_s) const {
+    const GapExperiment experiment(log_.string(), until_s);
+    Sum sum;
+    for (const std::vector<Gap>& gaps :
+         spread_gaps(GetParam().first_s, experiment.length_s() - kJudged_s, places, GetParam().apart_s)) {
+      for (const GapOutcome& o : experiment.run(gaps)) {
+        std::printf("%s\n", to_text(o).c_str());
+        ++sum.places;
+        sum.seen += o.tracked_before && o.seen_before() ? 1 : 0;
+        sum.back +=
+            o.tracked_before && o.seen_before() && o.back_after_s >= 0.0 && o.back_after_s <= 1.0 ? 1 : 0;
+        sum.poses += o.poses;
+        sum.wrong_poses += o.wrong_poses;
+      }
+    }
+    std::printf(
+        "%s: %d places, %d with a view seen before, back within a second at %d of them; %d poses, %d wrong\n",
+        GetParam().name.c_str(), sum.places, sum.seen, sum.back, sum.poses, sum.wrong_poses);
+    return sum;
+  }
+
+  fs::path log_;
+};
+
+TEST_P(RecordedGaps, EndInTheSameMap) {
+  const Sum sum = run(3, GetParam().first_s + 2.0 * GetParam().apart_s + kJudged_s);
+  EXPECT_EQ(sum.places, 3);
+  EXPECT_EQ(sum.seen, 3);
+  EXPECT_EQ(sum.back, sum.seen);
+  EXPECT_EQ(sum.wrong_poses, 0);
+}
+
+using RecordedGapsLong = RecordedGaps;
+
+TEST_P(RecordedGapsLong, EndInTheSameMap) {
+  const Sum sum = run(20, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(sum.places, 20);
+  EXPECT_GE(sum.seen, 15);
+  EXPECT_GE(sum.back, 0.8 * sum.seen);
+  EXPECT_EQ(sum.wrong_poses, 0);
+}
+
+const auto kName = [](const testing::TestParamInfo<Recording>& info) { return info.param.name; };
+INSTANTIATE_TEST_SUITE_P(Recordings, RecordedGaps, testing::Values(kKitti, kEuroc), kName);
+INSTANTIATE_TEST_SUITE_P(Recordings, RecordedGapsLong, testing::Values(kKitti, kEuroc), kName);
+
+}  // namespace
+}  // namespace farpoint::test
