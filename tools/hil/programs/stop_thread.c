@@ -7,7 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ptrace.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+enum { kLook_ms = 20 };
 
 static int has_name(const char* tasks, const char* task, const char* wanted) {
   char path[300], name[32] = "";
@@ -38,6 +41,10 @@ int main(int argc, char** argv) {
     fprintf(stderr, "no thread %s in %s\n", argv[2], argv[1]);
     return 1;
   }
-  sleep((unsigned)atoi(argv[3]));
+  // A thread that is killed meanwhile must be taken note of: until then its process cannot go.
+  for (int left_ms = 1000 * atoi(argv[3]); left_ms > 0; left_ms -= kLook_ms) {
+    if (waitpid(-1, NULL, __WALL | WNOHANG) < 0) break;
+    usleep(1000 * kLook_ms);
+  }
   return 0;
 }
