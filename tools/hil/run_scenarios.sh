@@ -12,14 +12,9 @@ for name in $(cat $root/names); do
   echo "$(cut -d' ' -f1 /proc/uptime) $from" | awk '{printf "%.0f\n", $1 - $2}' > "$left/seconds"
 
   pkill -KILL -s $session
-  if command -v farpointd > /dev/null; then
-    systemctl stop farpointd
-    systemctl revert farpointd
-    dpkg -P farpoint
-  fi > /dev/null 2>&1
   ip link delete vcan0 2> /dev/null
   sleep 0.5
-  for module in v4l2loopback vivid uvcvideo vhci-hcd sch_tbf vcan; do rmmod $module 2> /dev/null; done
+  for module in v4l2loopback vivid sch_tbf vcan; do rmmod $module 2> /dev/null; done
   rm -rf /tmp/*
 done
 exit 0

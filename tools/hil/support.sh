@@ -1,12 +1,11 @@
 # What scenarios share. $left is the folder that the host reads afterwards; what must be quick is in /tmp.
 daemon_log=/tmp/daemon.log
 control=/tmp/control
-began=$(date +%s)
-cd "$root" && cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
+cd "$root" && cp -t /tmp farpointd farpoint play frames.grey camera.yaml
 # The machine's time jumps while it waits for its disk: libraries and tools are read before anything is timed.
 /tmp/farpointd --version > /dev/null
 /tmp/farpoint --help > /dev/null
-cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/bin/journalctl /usr/bin/systemctl /usr/sbin/tc /usr/sbin/ip > /dev/null
+cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/sbin/tc /usr/sbin/ip > /dev/null
 
 bring_back() { cp -t "$left" /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
 trap bring_back EXIT
@@ -16,7 +15,6 @@ fail() {
   echo "$*" > /tmp/complaint
   echo "complaint: $*"
   tail -20 $daemon_log 2> /dev/null
-  journalctl -u farpointd --since "@$began" -o short-monotonic --no-pager 2> /dev/null | tail -40
   exit 1
 }
 
@@ -102,26 +100,3 @@ start_playing() {
   player=$!
 }
 go() { touch /tmp/go; }
-
-# --- the installed package, in a machine that systemd runs
-
-main_pid() { systemctl show -p MainPID --value farpointd; }
-# has_other_pid PID: the service runs, as another process.
-has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemctl -q is-active farpointd; }
-journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
-# service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
-service_tracks() {
-  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] &&
-    [ "${BASH_REMATCH[1]}" -ge 5 ]
-}
-
-# The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.
-install_service() {
-  dpkg -i "$root/farpoint.deb" > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
-  write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control /dev/video10 /etc/farpoint/camera.yaml
-  install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
-  systemctl start systemd-networkd
-  wait_until 20 "LCM's route" sh -c 'ip route | grep -q 224.0.0.0/4'
-  loopback
-  udevadm settle
-}
