@@ -27,7 +27,8 @@ seconds() { hundredths; echo "$((now / 100)).$(printf %02d $((now % 100)))"; }
 # since S: seconds since then.
 since() { hundredths; local past=$((now - 10#${1/./})); echo "$((past / 100)).$(printf %02d $((past % 100)))"; }
 at_most() { echo "$1 $2" | awk '{exit !($1 <= $2)}'; }
-exec {never}<> <(:)
+mkfifo /tmp/never
+exec {never}<> /tmp/never
 rest() { read -r -t 0.05 -u $never; }
 
 # wait_until SECONDS WHAT COMMAND...: the scenario fails where COMMAND does not succeed in time.
