@@ -75,7 +75,7 @@ void CanSink::on_frame(const FrameOutput& frame) {
   if (bus_) bus_->send(frames);
   if (steady_period_s_ > 0.0) {
     last_ = frame;
-    last_s_ = steady_s();
+    last_s_ = frame.age_at_s > 0.0 ? frame.age_at_s : steady_s();
     next_steady_s_ = last_s_ + steady_period_s_;
   }
   if (!log_) return;

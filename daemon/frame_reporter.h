@@ -26,7 +26,8 @@ class FrameReporter {
 
   // Hands the frame to every sink. `package->clock` gets the time of the output.
   const FrameOutput& report(FramePackage* package, const OutputCounts& out);
-  // The camera is away: tells every sink that there is no pose now, and why. age_us: since the last frame.
+  // The camera is away: tells every sink that there is no pose now, and why. utime: now, on the steady clock;
+  // age_us: since the last frame.
   const FrameOutput& report_silence(std::int64_t utime, std::int64_t age_us, const InputCounts& in,
                                     const OutputCounts& out);
   // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.

@@ -13,6 +13,9 @@ struct FrameOutput {
   bool valid = false;
   // From when the frame was due to its output; 0 in lockstep, which has no clock.
   std::int64_t age_us = 0;
+  // Steady clock: when it was of that age. What takes time between then and its sending must not make it
+  // younger. 0: there is no common clock.
+  double age_at_s = 0;
 };
 
 // The estimator's result with scale.assumed applied (0: none) and its validity decided. A result that is

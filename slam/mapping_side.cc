@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "slam/map/grow.h"
+
 namespace farpoint::slam {
 
 MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange* exchange)
@@ -9,7 +11,7 @@ MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange
 
 void MappingSide::collect_recorded() {
   while (const RecordedFrame* frame = exchange_.recorded.front()) {
-    recorded_.push_back(*frame);
+    append_in_steps(*frame, &recorded_);
     exchange_.recorded.pop();
   }
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/map/grow.h"
+
 namespace farpoint::slam {
 
 Map::Map(const CapacityConfig& capacity, const Rig& rig)
@@ -21,7 +23,7 @@ KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   slot.landmarks.assign(slot.set.features.size(), {});
   slot.covisible.clear();
   slot.optimised = 0;
-  skeleton_.push_back({handle, 0, {}, true, slot.utime});
+  append_in_steps(SkeletonNode{handle, 0, {}, true, slot.utime}, &skeleton_);
   return handle;
 }
 
@@ -92,10 +94,7 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   const LandmarkHandle handle = landmarks_.allocate();
   if (handle.is_null()) return handle;
   Landmark& l = landmarks_[handle];
-  std::vector<Observation> observations = std::move(l.observations);  // keeps its capacity
   l = Landmark{};
-  l.observations = std::move(observations);
-  l.observations.clear();
 
   const Feature& f = keyframe.set.features[feature];
   const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(keyframe.camera)];
@@ -161,7 +160,7 @@ void Map::remove_landmark(LandmarkHandle handle) {
   Landmark* l = landmarks_.get(handle);
   if (l == nullptr) return;
   for (const Observation& o : l->observations) detach_feature(o);
-  l->observations.clear();
+  l->observations = {};  // a slot must not keep what its best-seen landmark once needed
   landmarks_.release(handle);
 }
 

@@ -25,8 +25,8 @@ class Map {
   // most covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
   void remove_keyframe(KeyframeHandle handle);
   // Lets go of the pixels and of all that serves only the search for new landmarks: descriptors, bearings,
-  // grid, and the features that belong to no landmark. Observations keep naming the right feature. Nothing new
-  // can be matched with the keyframe afterwards.
+  // grid, and the features that belong to no landmark. Observations keep naming the right feature. Nothing
+  // new can be matched with the keyframe afterwards.
   void thin_keyframe(KeyframeHandle handle);
 
   // --- landmarks

@@ -60,12 +60,20 @@ class LandmarkMaker {
   void merge(LandmarkHandle a, LandmarkHandle b);
   void try_promote(LandmarkHandle landmark, bool through_vmp);
   [[nodiscard]] bool enough_information(const Landmark& landmark, const DepthFit& fit) const;
+  // Whether the other keyframes bear out a point that only two have seen. The corners of a pair on a guard
+  // rail, a lane marking, in a row of posts or on an asphalt that looks the same everywhere may be two
+  // different things: where the way to the true match is barred (it has left the image, or looks too
+  // different), a wrong one that moves along with the vehicle wins undisputed, as a distant point of small
+  // sigma. But where such a point would have to be in a third image, it is not. True also where no other
+  // keyframe should show it.
+  [[nodiscard]] bool found_elsewhere(const Landmark& landmark) const;
   [[nodiscard]] bool wanted(LandmarkHandle handle) const;
 
   const EstimatorConfig& config_;
   Map& map_;
   MappingCounts& counts_;
-  std::vector<float> level_scale_;  // of each pyramid level
+  std::vector<float> level_scale_;         // of each pyramid level
+  std::vector<KeyframeHandle> witnesses_;  // neighbours of the keyframe last processed
   // Work space, reused.
   EpipolarIndex index_;
   std::vector<std::uint8_t> wanted_old_;  // one a feature of the older keyframe

@@ -75,6 +75,17 @@ TEST_F(SteadyCan, BetweenTwoImagesAtTheRateWithGrowingAgeAndSigma) {
             sent.front().at("FARPOINT_POSITION_SIGMA.SigmaPositionX"));
 }
 
+TEST_F(SteadyCan, TimeThatSendingTookIsInTheAge) {
+  // Its age was 10 ms, but it took 30 ms until it was sent.
+  frame_.age_at_s = steady_s() - 0.030;
+  sink_.on_frame(frame_);
+  const double now_s = steady_s();
+  EXPECT_FALSE(sink_.tick(now_s, &wheels_));
+  const auto sent = epochs();
+  ASSERT_EQ(sent.size(), 2U);
+  EXPECT_NEAR(sent[1].at("FARPOINT_STATUS.Age"), 0.010 + now_s - frame_.age_at_s, 0.0002);
+}
+
 TEST_F(SteadyCan, AfterAQuarterOfASecondNothingIsClaimedAnyMore) {
   sink_.on_frame(frame_);
   const double began_s = steady_s();

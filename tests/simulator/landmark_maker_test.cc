@@ -222,6 +222,50 @@ TEST_F(LandmarkMakerTest, BaselineMakesNoVirtualPoints) {
   EXPECT_EQ(counts_.vmp_made + counts_.vmp_attached + counts_.vmp_promoted, 0U);
 }
 
+// Two corners that happen to lie on each other's epipolar line: the keyframes between them, which look the
+// same way, show nothing where the point would be.
+TEST_F(LandmarkMakerTest, APairThatOtherKeyframesDoNotBearOutWaitsAsAVirtualPoint) {
+  const KeyframeHandle a = look(0.0, {kNear}), c = look(0.3, {}), d = look(0.6, {}), b = look(1.0, {kNear});
+  maker_->process(b, {a, c, d});
+  ASSERT_NE(landmark(b, kNear.id), nullptr);
+  EXPECT_EQ(landmark(b, kNear.id)->state, LandmarkState::kBearing);
+  EXPECT_EQ(counts_.landmarks_made, 0U);
+  EXPECT_EQ(counts_.vmp_made, 1U);
+  // A third sighting that agrees is as good as a keyframe that bears it out.
+  const KeyframeHandle e = look(1.3, {kNear});
+  maker_->process(e, {b, a, c, d});
+  ASSERT_NE(landmark(e, kNear.id), nullptr);
+  EXPECT_EQ(landmark(e, kNear.id)->state, LandmarkState::kFull);
+  EXPECT_TRUE(landmark(e, kNear.id)->through_vmp);
+  expect_balance();
+}
+
+TEST_F(LandmarkMakerTest, TheBaselineDropsAPairThatOtherKeyframesDoNotBearOut) {
+  use(slam::LandmarkMode::kBaseline);
+  const KeyframeHandle a = look(0.0, {kNear}), c = look(0.3, {}), d = look(0.6, {}), b = look(1.0, {kNear});
+  maker_->process(b, {a, c, d});
+  EXPECT_EQ(landmark(b, kNear.id), nullptr);
+  EXPECT_EQ(counts_.landmarks_made, 0U);
+}
+
+// Hidden in two of three: still a point. Where nobody else looks there is nobody to ask.
+TEST_F(LandmarkMakerTest, OneKeyframeInThreeBearsAPairOut) {
+  const KeyframeHandle a = look(0.0, {kNear}), c = look(0.3, {}), d = look(0.6, {}), e = look(0.8, {kNear}),
+                       b = look(1.0, {kNear});
+  maker_->process(b, {a, c, d, e});
+  ASSERT_NE(landmark(b, kNear.id), nullptr);
+  EXPECT_NE(landmark(b, kNear.id)->state, LandmarkState::kBearing);
+  EXPECT_FALSE(landmark(b, kNear.id)->through_vmp);
+}
+
+TEST_F(LandmarkMakerTest, KeyframesThatLookElsewhereAreNotAsked) {
+  const SE3 backwards{Eigen::Quaterniond(0, 0, 1, 0), {0.5, 0.0, 0.0}};
+  const KeyframeHandle a = look(0.0, {kNear}), c = look(backwards, {}), b = look(1.0, {kNear});
+  maker_->process(b, {a, c});
+  ASSERT_NE(landmark(b, kNear.id), nullptr);
+  EXPECT_NE(landmark(b, kNear.id)->state, LandmarkState::kBearing);
+}
+
 TEST_F(LandmarkMakerTest, SightingsAttachUntilTheDepthIsKnown) {
   const KeyframeHandle a = look(0.0, {kFar}), b = look(1.0, {kFar});
   maker_->process(b, {a});

@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""usage: host_test.py ROOT
+
+The bench's checks on the host find what they are there to find: each on good data and on data with one fault. No
+machine is started. And every scenario can be read.
+"""
+
+import pathlib
+import sys
+import tempfile
+import types
+import unittest
+
+ROOT = pathlib.Path(sys.argv.pop(1)).resolve()
+sys.path.insert(0, str(ROOT / "tools/hil"))
+from host import can_bus, checks, lcm_log, scenario  # noqa: E402
+
+RATE_HZ, PERIOD_US = 50.0, 100_000
+CLOCKS_US = (1_000_000, 5_000_000)  # monotonic and real time at the same moment
+LAYOUT = can_bus.layout((ROOT / "config/farpoint.dbc").read_text())
+
+
+def put(data, message, name, number):
+    start, bits, _, _ = message.signals[name]
+    whole = int.from_bytes(data, "little") & ~((1 << bits) - 1 << start) | number << start
+    return bytearray(whole.to_bytes(len(data), "little"))
+
+
+def frame(identifier, counter, age_s, valid):
+    message = LAYOUT[identifier]
+    data = put(bytearray(message.size), message, "Counter", counter)
+    if identifier == can_bus.STATUS:
+        data = put(data, message, "Age", round(age_s * 1e4))
+        data = put(data, message, "State", 3 if valid else 1)
+        data = put(data, message, "PoseValid", valid)
+    if "Heading" in message.signals and not valid:
+        data = put(data, message, "Heading", 0x8000)
+    data[0] = can_bus.crc8(message.data_id, data[1:])
+    return data
+
+
+def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames):
+    """Epochs every 20 ms, of the newest image that is at least 30 ms old."""
+    with open(path, "w") as log:
+        for epoch in range(100):
+            now_us = stamps_us[0] + 30_000 + 20_000 * epoch
+            age_s = 1e-6 * (now_us - max(s for s in stamps_us if s <= now_us - 30_000))
+            frames = {i: frame(i, epoch % 15, age_s, epoch > 10) for i in sorted(LAYOUT)}
+            for identifier, data in spoil(epoch, frames).items():
+                time_s = 1e-6 * (now_us - CLOCKS_US[0] + CLOCKS_US[1])
+                log.write(f"({time_s:.6f}) vcan0 {identifier:X}#{bytes(data).hex().upper()}\n")
+
+
+class Bus(unittest.TestCase):
+    def complaint(self, spoil=lambda epoch, frames: frames, rate_hz=RATE_HZ, expectations=("valid",)):
+        stamps_us = [2_000_000 + PERIOD_US * i for i in range(21)]
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "bus.log"
+            bus_log(path, stamps_us, spoil)
+            return can_bus.Receiver(LAYOUT).check(path, stamps_us, CLOCKS_US, rate_hz, expectations)[0]
+
+    def at_50(self, change):
+        return lambda epoch, frames: change(dict(frames)) if epoch == 50 else frames
+
+    def test_good(self):
+        self.assertIsNone(self.complaint())
+
+    def test_crc(self):
+        def flip(frames):
+            frames[0x303][3] ^= 4
+            return frames
+        self.assertRegex(self.complaint(self.at_50(flip)), "wrong CRC of FARPOINT_ATTITUDE")
+
+    def test_missing_frame(self):
+        self.assertRegex(self.complaint(self.at_50(lambda f: {i: d for i, d in f.items() if i != 0x305})), "7 frames")
+
+    def test_missing_epoch(self):
+        self.assertRegex(self.complaint(self.at_50(lambda f: {})), "counter 6 after 4")
+
+    def test_unknown_frame(self):
+        self.assertRegex(self.complaint(self.at_50(lambda f: {0x123: bytearray(8)})), "not in the DBC")
+
+    def test_rate(self):
+        self.assertRegex(self.complaint(rate_hz=60.0), "50.0 Hz.*expected 60 Hz")
+
+    def test_age(self):
+        late = lambda epoch, frames: {i: frame(i, epoch % 15, 0.05, epoch > 10) for i in frames}  # noqa: E731
+        self.assertRegex(self.complaint(late), "the age is wrong")
+
+    def test_heading_without_a_pose(self):
+        def heading(frames):
+            frames[can_bus.STATUS] = frame(can_bus.STATUS, 50 % 15, 0.05, False)
+            return frames
+        self.assertRegex(self.complaint(self.at_50(heading)), "a heading without a valid pose")
+
+    def test_no_pose(self):
+        def never(epoch, frames):
+            return {i: frame(i, epoch % 15, 0.03 + 0.02 * (epoch % 5), False) for i in frames}
+        self.assertRegex(self.complaint(never), "only 0 epochs with a valid pose")
+
+
+class Images(unittest.TestCase):
+    def complaint(self, spoil=lambda events: events, may_miss="0"):
+        frames = [bytes([number]) * checks.FRAME_BYTES for number in range(10)]
+        events = []
+        for number, pixels in enumerate(frames):
+            head = lcm_log.IMAGE.pack(7_000 + 100 * number, number, 0, -1, -1.0, 320, 240, 320, 0, len(pixels))
+            events.append(("CAMERA_0", bytes(8) + head + pixels))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "frames.grey").write_bytes(b"".join(frames))
+            (folder / "played").write_text("clock 1 2\n" + "".join(f"{i} {i} {7000 + 100 * i}\n" for i in range(10)))
+            lcm_log.write(folder / "run.lcm", spoil(events))
+            return checks.images(folder, types.SimpleNamespace(), "run.lcm", "played", "5", may_miss)[0]
+
+    def test_good(self):
+        self.assertIsNone(self.complaint())
+
+    def test_missing(self):
+        self.assertRegex(self.complaint(lambda e: e[:4] + e[5:]), "frame 4 never came; 1 of 10")
+        self.assertIsNone(self.complaint(lambda e: e[:4] + e[5:], may_miss="1"))
+
+    def test_twice_or_in_another_order(self):
+        self.assertRegex(self.complaint(lambda e: e[:4] + e[3:]), "image 4 .* has come already")
+        self.assertRegex(self.complaint(lambda e: [e[1], e[0], *e[2:]]), "image 1 .* has come already")
+
+    def test_other_bytes(self):
+        self.assertRegex(self.complaint(lambda e: e[:4] + [("CAMERA_0", e[4][1][:-1] + b"\xff")] + e[5:]),
+                         "image 4 is not frame 4")
+
+    def test_other_time(self):
+        late = lambda e: e[:4] + [("CAMERA_0", lcm_log.with_image(e[4][1], 7_430, b""))] + e[5:]  # noqa: E731
+        self.assertRegex(self.complaint(late), "image 4 of time 7430 is of no frame")
+
+
+class Scenarios(unittest.TestCase):
+    def test_can_be_read(self):
+        known = scenario.read_all(ROOT / "tools/hil/scenarios")
+        self.assertGreater(len(known), 5)
+        for one in known:
+            self.assertIn(one.form, ("short", "long"), one.name)
+            self.assertIn("BROKEN", one.script, one.name)
+            for name, *_ in one.checks:
+                self.assertIn(name, checks.CHECKS, one.name)
+
+    def test_fails_as_it_says(self):
+        one = scenario.Scenario("a", "", "", broken_says="^frame 5 never")
+        self.assertTrue(one.fails_as_it_says("frame 5 never came"))
+        self.assertFalse(one.fails_as_it_says("the scenario did not end in time"))
+        self.assertFalse(one.fails_as_it_says(None))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,46 @@
+"""The virtual machine."""
+
+import pathlib
+import subprocess
+
+from host import material
+
+# The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest
+# sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
+# first.
+VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
+SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
+
+
+def guest(here, packages):
+    """The folder of the guest, which is built where it is not there."""
+    done = subprocess.run([here / "guest/build", *packages], stdout=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise material.NotMade("the guest could not be built")
+    return pathlib.Path(done.stdout.strip())
+
+
+def command(guest_folder, kind, devices, folder):
+    kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
+    kernel_line += SYSTEMD if kind == "systemd" else ""
+    return ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
+            "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
+            "-serial", "stdio", "-monitor", "none", "-no-reboot",
+            "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,
+            "-drive", f"file={guest_folder / 'root.ext4'},format=raw,if=virtio,snapshot=on",
+            "-virtfs", f"local,path={folder},mount_tag=share,security_model=none,multidevs=remap",
+            "-device", "isa-debug-exit,iobase=0xf4,iosize=0x04", *devices.split()]
+
+
+def run(guest_folder, kind, devices, folder, timeout_s):
+    """Runs the scenarios that were laid into `folder`, to their end or to that of the time."""
+    with open(folder / "console", "wb") as console:
+        machine = subprocess.Popen(command(guest_folder, kind, devices, folder), stdin=subprocess.DEVNULL,
+                                   stdout=console, stderr=console)
+        try:
+            machine.wait(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            machine.kill()
+            machine.wait()

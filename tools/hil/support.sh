@@ -1,0 +1,127 @@
+# What scenarios share. $left is the folder that the host reads afterwards; what must be quick is in /tmp.
+daemon_log=/tmp/daemon.log
+control=/tmp/control
+began=$(date +%s)
+cd "$root" && cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
+# The machine's time jumps while it waits for its disk: libraries and tools are read before anything is timed.
+/tmp/farpointd --version > /dev/null
+/tmp/farpoint --help > /dev/null
+cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/bin/journalctl /usr/bin/systemctl /usr/sbin/tc /usr/sbin/ip > /dev/null
+
+bring_back() { cp -t "$left" /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
+trap bring_back EXIT
+
+# fail TEXT: ends the scenario with this complaint.
+fail() {
+  echo "$*" > /tmp/complaint
+  echo "complaint: $*"
+  tail -20 $daemon_log 2> /dev/null
+  journalctl -u farpointd --since "@$began" -o short-monotonic --no-pager 2> /dev/null | tail -40
+  exit 1
+}
+
+# figure TEXT: for the table.
+figure() { echo "$*" >> /tmp/figures; }
+
+# Without further processes, each of which costs the emulated processor some ms.
+hundredths() { read -r uptime _ < /proc/uptime; now=${uptime/./}; }
+seconds() { hundredths; echo "$((now / 100)).$(printf %02d $((now % 100)))"; }
+# since S: seconds since then.
+since() { hundredths; local past=$((now - 10#${1/./})); echo "$((past / 100)).$(printf %02d $((past % 100)))"; }
+at_most() { echo "$1 $2" | awk '{exit !($1 <= $2)}'; }
+exec {never}<> <(:)
+rest() { read -r -t 0.05 -u $never; }
+
+# wait_until SECONDS WHAT COMMAND...: the scenario fails where COMMAND does not succeed in time.
+wait_until() {
+  local for_s=$1 what=$2 last
+  shift 2
+  hundredths
+  last=$((now + 100 * for_s))
+  until "$@" > /dev/null 2>&1; do
+    hundredths
+    [ $now -le $last ] || fail "$what: not within $for_s s"
+    rest
+  done
+}
+
+says() { grep -q -- "$1" $daemon_log; }
+# How many lines say so.
+said() { grep -c -- "$1" $daemon_log; }
+said_times() { [ "$(said "$1")" -ge "$2" ]; }
+
+# Few features of small images: what the guest's processor tracks live.
+write_configuration() {
+  cat > "$1" <<YAML
+control:
+  socket: ${2:-$control}
+camera:
+  device: ${3:-/dev/video10}
+  calibration: ${4:-/tmp/camera.yaml}
+  rate_hz: 10
+  lost_after_s: 0.5
+  exposure: camera
+pyramid:
+  levels: 4
+extractor:
+  features: 300
+capacity:
+  keyframes: 200
+  landmarks: 8000
+initialisation:
+  min_landmarks: 40
+tracking:
+  min_inliers: 15
+  degraded_inliers: 25
+${5:-}
+YAML
+}
+
+# start_daemon ARGUMENT...: live, without LCM's network unless it is asked for.
+start_daemon() {
+  write_configuration /tmp/farpoint.yaml
+  /tmp/farpointd --config /tmp/farpoint.yaml --set lcm.enabled=false "$@" > $daemon_log 2>&1 &
+  daemon=$!
+  wait_until 30 "the daemon's start" says "live from"
+}
+
+stop_daemon() {
+  local from
+  from=$(seconds)
+  kill -TERM $daemon
+  wait $daemon || fail "the daemon ended with status $? at SIGTERM"
+  stopped_in_s=$(since "$from")
+}
+
+loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
+
+# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
+start_playing() {
+  rm -f /tmp/go
+  /tmp/play /dev/video10 320x240 10 "$1" /tmp/go /tmp/frames.grey ${2:+"$2"} > /tmp/played &
+  player=$!
+}
+go() { touch /tmp/go; }
+
+# --- the installed package, in a machine that systemd runs
+
+main_pid() { systemctl show -p MainPID --value farpointd; }
+# has_other_pid PID: the service runs, as another process.
+has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemctl -q is-active farpointd; }
+journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
+# service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
+service_tracks() {
+  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] &&
+    [ "${BASH_REMATCH[1]}" -ge 5 ]
+}
+
+# The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.
+install_service() {
+  dpkg -i "$root/farpoint.deb" > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
+  write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control /dev/video10 /etc/farpoint/camera.yaml
+  install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
+  systemctl start systemd-networkd
+  wait_until 20 "LCM's route" sh -c 'ip route | grep -q 224.0.0.0/4'
+  loopback
+  udevadm settle
+}
