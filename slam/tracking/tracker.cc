@@ -85,8 +85,8 @@ void Tracker::set_view(std::shared_ptr<const LocalView> view) {
       const auto now = std::find_if(view->keyframes.begin(), view->keyframes.end(),
                                     [&](const ViewKeyframe& k) { return k.id == old->id; });
       if (now == view->keyframes.end()) continue;
-      const SE3 T_new_old = now->T_world_body * old->T_world_body.inverse();
-      for (Motion* m : {&now_, &sure_}) m->T_world_body = T_new_old * m->T_world_body;
+      for (Motion* m : {&now_, &sure_})
+        m->T_world_body = now->T_world_body * (old->T_world_body.inverse() * m->T_world_body);
       break;
     }
   }

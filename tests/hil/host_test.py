@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """usage: host_test.py ROOT
 
-The bench's checks on the host find what they are there to find: each on good data and on data with one fault. No machine
-is started. And every scenario can be read.
+The bench's checks on the host find what they are there to find: each on good data and on data with one fault. No
+machine is started. And every scenario can be read.
 """
 
 import pathlib
@@ -94,7 +94,8 @@ class Bus(unittest.TestCase):
         self.assertRegex(self.complaint(self.at_50(heading)), "a heading without a valid pose")
 
     def test_no_pose(self):
-        never = lambda epoch, frames: {i: frame(i, epoch % 15, 0.03 + 0.02 * (epoch % 5), False) for i in frames}  # noqa: E731
+        def never(epoch, frames):
+            return {i: frame(i, epoch % 15, 0.03 + 0.02 * (epoch % 5), False) for i in frames}
         self.assertRegex(self.complaint(never), "only 0 epochs with a valid pose")
 
 

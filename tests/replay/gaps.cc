@@ -8,8 +8,8 @@
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/config.h"
 #include "daemon/log_frame_source.h"
@@ -84,13 +84,13 @@ SE3 nearest_truth(const tools::Trajectory& truth, double time_s) {
 
 // Landmarks of the map that the keyframes of the last second saw.
 std::vector<Eigen::Vector3d> landmarks_of_late(const slam::Estimator& estimator, std::int64_t now_utime) {
-  std::set<std::uint64_t> ids;
-  estimator.visit_sightings([&](std::uint64_t id, std::int64_t utime, const Eigen::Vector2f&) {
-    if (utime > now_utime - 1'000'000) ids.insert(id);
-  });
   std::vector<Eigen::Vector3d> points;
-  for (const slam::LandmarkInfo& l : estimator.landmarks())
-    if (l.full && ids.contains(l.id)) points.push_back(l.position_map);
+  for (const slam::LandmarkInfo& l : estimator.landmarks()) {
+    if (!l.full) continue;
+    const std::vector<slam::LandmarkSighting> sightings = estimator.sightings(l);
+    if (!sightings.empty() && sightings.back().utime > now_utime - 1'000'000)
+      points.push_back(l.position_map);
+  }
   return points;
 }
 

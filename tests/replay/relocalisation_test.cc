@@ -2,20 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "tests/replay/gaps.h"
+#include "tests/replay/recordings.h"
 
 namespace farpoint::test {
 namespace {
-
-namespace fs = std::filesystem;
-
-const fs::path kData = fs::path(FARPOINT_SOURCE_DIR) / ".." / "shared" / "data";
 
 struct Recording {
   std::string name;
@@ -25,8 +21,8 @@ struct Recording {
   double first_s;      // of the first gap: the map has settled
 };
 
-const Recording kKitti{"kitti03", "kitti", "kitti {} 03", 7.0, 4.0};
-const Recording kEuroc{"euroc", "euroc/MH_01_part", "euroc {}", 5.0, 3.0};
+const Recording kKitti{"kitti03", "kitti", "kitti {}/kitti 03", 7.0, 4.0};
+const Recording kEuroc{"euroc", "euroc/MH_01_part", "euroc {}/euroc/MH_01_part", 5.0, 3.0};
 
 struct Sum {
   int places = 0, seen = 0, back = 0, poses = 0, wrong_poses = 0;
@@ -35,19 +31,17 @@ struct Sum {
 class RecordedGaps : public testing::TestWithParam<Recording> {
  protected:
   void SetUp() override {
-    const fs::path folder = kData / GetParam().folder;
-    if (!fs::exists(folder)) GTEST_SKIP() << "no recording " << folder;
-    log_ = fs::path(testing::TempDir()) / ("farpoint_gaps_" + GetParam().name + ".lcm");
-    std::string import = GetParam().import;
-    import.replace(import.find("{}"), 2, folder.string());
-    const std::string command = FARPOINT_BINARY_DIR "/bin/farpoint import " + import + " -o " + log_.string();
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    if (!std::filesystem::exists(kData / GetParam().folder))
+      GTEST_SKIP() << "no recording " << (kData / GetParam().folder);
+    const std::string command =
+        (kBin / "farpoint").string() + " import " + with_data(GetParam().import) + " -o " + log();
+    ASSERT_EQ(test::run(command), 0) << command;
   }
-  void TearDown() override { fs::remove(log_); }
+  std::string log() const { return work_.file("run.lcm"); }
 
   // `places` gaps up to `until_s`.
-  Sum run(int places, double until_s) const {
-    const GapExperiment experiment(log_.string(), until_s);
+  Sum measure(int places, double until_s) const {
+    const GapExperiment experiment(log(), until_s);
     Sum sum;
     for (const std::vector<Gap>& gaps :
          spread_gaps(GetParam().first_s, experiment.length_s() - kJudged_s, places, GetParam().apart_s)) {
@@ -67,11 +61,11 @@ class RecordedGaps : public testing::TestWithParam<Recording> {
     return sum;
   }
 
-  fs::path log_;
+  const WorkFolder work_{"gaps_" + GetParam().name};
 };
 
 TEST_P(RecordedGaps, EndInTheSameMap) {
-  const Sum sum = run(3, GetParam().first_s + 2.0 * GetParam().apart_s + kJudged_s);
+  const Sum sum = measure(3, GetParam().first_s + 2.0 * GetParam().apart_s + kJudged_s);
   EXPECT_EQ(sum.places, 3);
   EXPECT_EQ(sum.seen, 3);
   EXPECT_EQ(sum.back, sum.seen);
@@ -81,7 +75,7 @@ TEST_P(RecordedGaps, EndInTheSameMap) {
 using RecordedGapsLong = RecordedGaps;
 
 TEST_P(RecordedGapsLong, EndInTheSameMap) {
-  const Sum sum = run(20, std::numeric_limits<double>::infinity());
+  const Sum sum = measure(20, std::numeric_limits<double>::infinity());
   EXPECT_EQ(sum.places, 20);
   EXPECT_GE(sum.seen, 15);
   EXPECT_GE(sum.back, 0.8 * sum.seen);

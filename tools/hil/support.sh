@@ -111,7 +111,8 @@ has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemc
 journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
 # service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
 service_tracks() {
-  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] && [ "${BASH_REMATCH[1]}" -ge 5 ]
+  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] &&
+    [ "${BASH_REMATCH[1]}" -ge 5 ]
 }
 
 # The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.

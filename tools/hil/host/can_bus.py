@@ -162,9 +162,10 @@ class Receiver:
         attitude = next(i for i, m in self.messages.items() if "Heading" in m.signals)
         for epoch in epochs:
             status = epoch.frames[STATUS]
+            valid = value(self.messages[STATUS], "PoseValid", status)
             not_available = raw(self.messages[attitude], "Heading", epoch.frames[attitude]) == 0x8000
-            if not value(self.messages[STATUS], "PoseValid", status) and not not_available:
+            if not valid and not not_available:
                 return f"a heading without a valid pose at {epoch.time_s:.3f}"
-            if value(self.messages[STATUS], "PoseValid", status) and raw(self.messages[STATUS], "State", status) in NOT_TRACKING:
+            if valid and raw(self.messages[STATUS], "State", status) in NOT_TRACKING:
                 return f"a valid pose in a state that has none at {epoch.time_s:.3f}"
         return None

@@ -72,7 +72,7 @@ def status(folder, stock, log, *limits):
 
 
 def reference_log(folder, log, of, path):
-    """What the recording must be: its calibration, and the frames that were played with the times at which they were."""
+    """What the recording must be: its calibration, and the frames that were played, with their times."""
     _, frames = played(folder / of)
     pixels = (folder / "frames.grey").read_bytes()
     patterns = [data for data, _ in lcm_log.images(folder / log)]
@@ -85,8 +85,8 @@ def reference_log(folder, log, of, path):
 
 def replay(folder, stock, log, output, *arguments):
     """Replays natively with the configuration of the guest."""
-    run_program(stock.build / "bin/farpointd", "--config", folder / "farpoint.yaml", "--replay", folder / log, "--output",
-                folder / output, *arguments)
+    run_program(stock.build / "bin/farpointd", "--config", folder / "farpoint.yaml", "--replay", folder / log,
+                "--output", folder / output, *arguments)
 
 
 def difference(first, second):

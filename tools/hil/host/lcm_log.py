@@ -14,10 +14,10 @@ CAMERA = struct.Struct(">ii4d5d3d4ddd")
 
 # status_t behind its fingerprint, as far as it is read here.
 STATUS = struct.Struct(">qbbdbii16q")
-STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter", "frames_received",
-                "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped", "images_wrong_size",
-                "images_undecodable", "images_missing", "images_flagged", "camera_losses", "images_unknown_camera",
-                "times_backwards", "messages_undecodable", "log_damages", "imu_invalid", "can_receive_errors")
+STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter",
+                "frames_received", "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped",
+                "images_wrong_size", "images_undecodable", "images_missing", "images_flagged", "camera_losses",
+                "images_unknown_camera", "times_backwards", "messages_undecodable", "log_damages", "imu_invalid", "can_receive_errors")
 
 
 @dataclasses.dataclass

@@ -5,8 +5,9 @@ import subprocess
 
 from host import material
 
-# The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest sees
-# a processor of the same speed. Waiting for the disk lets its time jump, so what has a deadline is in memory first.
+# The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest
+# sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
+# first.
 VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
 SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
@@ -20,9 +21,10 @@ def guest(here, packages):
 
 
 def command(guest_folder, kind, devices, folder):
-    kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check " + (SYSTEMD if kind == "systemd" else "")
-    return ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=single",
-            *VIRTUAL_TIME, "-cpu", "max", "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
+    kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
+    kernel_line += SYSTEMD if kind == "systemd" else ""
+    return ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
+            "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
             "-serial", "stdio", "-monitor", "none", "-no-reboot",
             "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,
             "-drive", f"file={guest_folder / 'root.ext4'},format=raw,if=virtio,snapshot=on",

@@ -1,4 +1,4 @@
-# The bus's interface goes down, away, and its queue fills up: tracking goes on, and so do the frames, none of them stale.
+# The bus's interface goes down, away, and its queue fills up: the frames come again by themselves, none of them stale.
 #@ form: short
 #@ check: bus after_down.log played 50
 #@ check: bus after_away.log played 50

@@ -36,6 +36,7 @@ figure "kill -9: tracks frames again after $(since "$from") s"
 from=$(seconds)
 systemctl stop farpointd
 stopped_in_s=$(since "$from")
-[ "$(systemctl show -p Result --value farpointd)" = success ] || fail "stopped: $(systemctl show -p Result --value farpointd)"
+result=$(systemctl show -p Result --value farpointd)
+[ "$result" = success ] || fail "stopped: $result"
 at_most "$stopped_in_s" 1 || fail "the stop took $stopped_in_s s"
 figure "stopped in $stopped_in_s s"

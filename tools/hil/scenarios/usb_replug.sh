@@ -30,4 +30,5 @@ kill $camera
 wait $camera
 stop_daemon
 cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played
-figure "streams again after$(echo "$times" | tr ' ' '\n' | sort -n | sed -n '2p;$p' | tr '\n' ' ' | awk '{print " " $1 " to " $2 " s"}')"
+times=$(tr ' ' '\n' <<< "${times# }" | sort -n)
+figure "streams again after $(head -1 <<< "$times") to $(tail -1 <<< "$times") s"
