@@ -1,5 +1,5 @@
 // A recorded LCM log as the source of measurements: in the order of the file, checked, with counts of what
-// was refused.
+// was refused. An image whose time leaps waits until the next one bears it out (kMaxLeap_us).
 //
 // A measurement's time is its message's utime; the log event's time is only when it was recorded.
 #pragma once

@@ -403,7 +403,7 @@ class DamagedLog {
 
 class RandomDamage : public testing::Test {
  protected:
-  static constexpr int kFrames = 30;
+  static constexpr int kFrames = 42;  // the map has settled after half of them
 
   void damage_and_replay(int first_seed, int seeds) {
     SyntheticLog log;
@@ -426,9 +426,9 @@ class RandomDamage : public testing::Test {
       for (std::uint64_t flips = 1 + random() % 20; flips > 0 && log.size() > 0; --flips)
         log.flip_at_random(random() % 2 == 0, &random);
     test::write_bytes(scratch_.path("damaged.lcm"), log.bytes());
-    // Few features: a sixth of the time, and the images are small.
+    // Fewer features: half of the time, and the images are small.
     const Replayed r =
-        replay(scratch_.path("damaged.lcm"), scratch_.path("out.lcm"), {"--set", "extractor.features=400"});
+        replay(scratch_.path("damaged.lcm"), scratch_.path("out.lcm"), {"--set", "extractor.features=800"});
 
     const Times intact = log.images(true);
     EXPECT_TRUE(r.outcome.status == 0 || r.outcome.status == 2) << r.outcome.status;

@@ -108,7 +108,7 @@ class LogSourceTest : public testing::Test {
 
 using Times = std::vector<std::int64_t>;
 
-TEST_F(LogSourceTest, GivesEverythingInTheOrderOfTheFile) {
+TEST_F(LogSourceTest, GivesEverythingInTheOrderOfTheFileButImagesHeldBack) {
   const auto items = read([](ipc::LogWriter& log) {
     log.write_message("CALIBRATION", 900, make_calibration(2));
     log.write_message("IMU", 901, make_imu(5));
@@ -118,15 +118,18 @@ TEST_F(LogSourceTest, GivesEverythingInTheOrderOfTheFile) {
     log.write_message("OTHER", 905, make_imu(6));
     log.write_message("WHEELS", 906, make_wheels(0));
   });
-  EXPECT_EQ(utimes(items), (Times{0, 5, 10, 3, 10, 0}));  // the message's time, not the event's
+  // The message's time, not the event's. The first image of a camera waits for a second one, here for the
+  // end.
+  EXPECT_EQ(utimes(items), (Times{0, 5, 3, 0, 10, 10}));
   ASSERT_EQ(items.size(), 6U);
   EXPECT_EQ(items[0].kind, LogItemKind::kCalibration);
   EXPECT_EQ(items[1].kind, LogItemKind::kImu);
-  EXPECT_EQ(items[2].kind, LogItemKind::kImage);
-  EXPECT_EQ(items[2].camera, 0);
-  EXPECT_EQ(items[3].kind, LogItemKind::kGroundTruth);
-  EXPECT_EQ(items[4].camera, 1);
-  EXPECT_EQ(items[5].kind, LogItemKind::kWheels);
+  EXPECT_EQ(items[2].kind, LogItemKind::kGroundTruth);
+  EXPECT_EQ(items[3].kind, LogItemKind::kWheels);
+  EXPECT_EQ(items[4].kind, LogItemKind::kImage);
+  EXPECT_EQ(items[4].camera, 0);
+  EXPECT_EQ(items[5].kind, LogItemKind::kImage);
+  EXPECT_EQ(items[5].camera, 1);
   EXPECT_EQ(decoded_, 2);
   EXPECT_EQ(counts_.others, 1U);
   EXPECT_EQ(counts_.times_backwards, 0U);

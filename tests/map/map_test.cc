@@ -22,7 +22,6 @@ CapacityConfig small_capacity() {
 }
 
 // --- consistency
-// -----------------------------------------------------------------------------------------------------
 
 void check_keyframe_links(const Map& map, KeyframeHandle h, const Keyframe& k) {
   ASSERT_EQ(k.landmarks.size(), k.set.features.size());
@@ -193,7 +192,6 @@ TEST(Map, TheSameOperationsGiveTheSameHandles) {
 }
 
 // --- single operations
-// -------------------------------------------------------------------------------------------------
 
 class MapTest : public testing::Test {
  protected:
@@ -368,7 +366,6 @@ TEST_F(MapTest, ThinningKeepsHostBestPairAndNewest) {
 }
 
 // --- fuse
-// ----------------------------------------------------------------------------------------------------------------
 
 TEST_F(MapTest, FuseMovesWhatDoesNotCollide) {
   const auto k = keyframes(5);
@@ -414,7 +411,6 @@ TEST_F(MapTest, FuseStopsAtTheObservationLimit) {
 }
 
 // --- re-hosting
-// ------------------------------------------------------------------------------------------------------------
 
 struct Geometry {
   Eigen::Vector4d point;
@@ -512,7 +508,6 @@ TEST_F(MapTest, ForgettingHostsMovesNothingAndKeepsTheLandmark) {
 }
 
 // --- covisibility
-// ------------------------------------------------------------------------------------------------------------
 
 TEST(MapCovisibility, CountsWhatBruteForceCounts) {
   const CapacityConfig capacity = small_capacity();
@@ -561,7 +556,6 @@ TEST_F(MapTest, CovisibilityOfOneUpdateReachesTheOthers) {
 }
 
 // --- the way home
-// ----------------------------------------------------------------------------------------------------------------
 
 void expect_same_pose(const SE3& a, const SE3& b) {
   EXPECT_LT((a.t - b.t).norm(), 1e-9);
