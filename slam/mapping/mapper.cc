@@ -435,9 +435,14 @@ void Mapper::refine_calibration() {
   const StageSpan span(listener_, Stage::kCalibration);
   // Poses and depths are at their optimum for the present calibration: what is left in the residuals is
   // noise, or a calibration that is not quite right.
-  std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size());
-  for (std::size_t i = 0; i < problem_.points.size(); ++i)
-    if (const Landmark* l = map_.landmarks().get(problem_landmarks_[i])) d_bearing[i] = l->d_bearing_d_pixel;
+  std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size(),
+                                                     Eigen::Matrix<double, 3, 2>::Zero());
+  for (std::size_t i = 0; i < problem_.points.size(); ++i) {
+    if (const Landmark* l = map_.landmarks().get(problem_landmarks_[i]))
+      d_bearing[i] = l->d_bearing_d_pixel;
+    else
+      problem_.points[i].measurements = 0;  // found wrong since: it has no say
+  }
   if (calibrator_.update(problem_, d_bearing)) map_.set_camera(0, calibrator_.camera());
 }
 
