@@ -14,8 +14,8 @@ namespace farpoint::slam {
 void cull_redundant_keyframes(const std::vector<KeyframeHandle>& candidates, std::uint64_t newest_id,
                               Map* map, MappingCounts* counts);
 
-// Takes the pixels from all but the newest `images` keyframes; removes the oldest keyframes (never `newest`)
-// where a pool is full, and landmarks that only they saw.
+// Thins all but the newest `images` keyframes (Map::thin_keyframe); removes the oldest keyframes (never
+// `newest`) where a pool is full, and landmarks that only they saw.
 void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Map* map,
                   MappingCounts* counts);
 

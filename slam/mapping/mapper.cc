@@ -258,6 +258,7 @@ void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
 
 void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks) {
   Keyframe& keyframe = map_.keyframes()[handle];
+  if (!keyframe.image) return;  // thinned: it has no corners left to be matched
   const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
   const Predictor predictor(camera, map_.T_world_camera(keyframe).inverse());
   const double scale_factor = config_.pyramid.scale_factor;

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "daemon/run.h"
-#include "ipc/log.h"
-#include "ipc/message.h"
+#include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 
 namespace farpoint::test {
@@ -40,19 +39,6 @@ inline Outcome run_daemon(std::vector<std::string> arguments) {
 inline std::string text_of(const std::string& path) {
   const auto bytes = read_bytes(path);
   return {bytes.begin(), bytes.end()};
-}
-
-template <typename Message>
-std::vector<Message> messages_of(const std::string& log, const std::string& channel) {
-  std::vector<Message> all;
-  ipc::LogReader reader(log);
-  ipc::LogEvent event;
-  while (reader.next(&event)) {
-    if (event.channel != channel) continue;
-    all.emplace_back();
-    EXPECT_TRUE(ipc::decode(event.data, &all.back())) << channel;
-  }
-  return all;
 }
 
 }  // namespace farpoint::test

@@ -1,11 +1,14 @@
-// What is in a log, for comparing two.
+// What is in a log.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
 #include "ipc/channels.h"
 #include "ipc/log.h"
+#include "ipc/message.h"
 
 namespace farpoint::test {
 
@@ -20,6 +23,20 @@ inline std::vector<std::string> events_of(const std::string& path) {
                      std::string(event.data.begin(), event.data.end()));
   }
   return events;
+}
+
+// The messages of one channel, in order.
+template <typename Message>
+std::vector<Message> messages_of(const std::string& log, const std::string& channel) {
+  std::vector<Message> all;
+  ipc::LogReader reader(log);
+  ipc::LogEvent event;
+  while (reader.next(&event)) {
+    if (event.channel != channel) continue;
+    all.emplace_back();
+    EXPECT_TRUE(ipc::decode(event.data, &all.back())) << channel;
+  }
+  return all;
 }
 
 }  // namespace farpoint::test

@@ -12,6 +12,7 @@
 #include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 #include "tests/realtime/heap_watch.h"
+#include "tests/replay/recordings.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -21,18 +22,6 @@ namespace fs = std::filesystem;
 // Faster than the camera, so that the test is short; frames may be dropped. Not for KITTI: a map that is lost
 // because mapping has no time to follow is looked for anew, and that may use the heap.
 constexpr double kFast = 4.0, kCameraSpeed = 1.0;
-
-fs::path data_folder() {
-  return fs::path(FARPOINT_SOURCE_DIR).parent_path() / "shared" / "data";
-}
-
-// The imported recording; empty where it is not there.
-std::string imported(const test::Scratch& scratch, const std::string& arguments) {
-  const std::string log = scratch.path("run.lcm");
-  const std::string command =
-      std::string(FARPOINT_BINARY_DIR) + "/bin/farpoint import " + arguments + " -o " + log;
-  return std::system(command.c_str()) == 0 ? log : "";
-}
 
 Options threaded(const test::Scratch& scratch, const std::string& log, double speed = kFast) {
   Options options;
@@ -63,11 +52,11 @@ ThreadHooks watch_from_settled(bool* watched) {
 }
 
 void expect_no_heap_calls(const std::string& recording, double speed) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "no recordings in " << data_folder();
+  if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
   if (!test::heap_is_watched()) GTEST_SKIP() << "a sanitizer owns the heap";
   const test::Scratch scratch;
-  const std::string log = imported(scratch, recording);
-  ASSERT_FALSE(log.empty());
+  const std::string log = scratch.path("run.lcm");
+  ASSERT_TRUE(test::import_recording(recording, log));
   bool watched = false;
   const int status = replay(threaded(scratch, log, speed), quiet_config(), watch_from_settled(&watched));
   test::stop_watching_heap();
@@ -84,19 +73,19 @@ void expect_no_heap_calls(const std::string& recording, double speed) {
 }
 
 TEST(RecordedThreads, NoHeapOnKittiAfterSettling) {
-  expect_no_heap_calls("kitti " + (data_folder() / "kitti").string() + " 03", kCameraSpeed);
+  expect_no_heap_calls("kitti {}/kitti 03", kCameraSpeed);
 }
 
 TEST(RecordedThreads, NoHeapOnEurocAfterSettling) {
-  expect_no_heap_calls("euroc " + (data_folder() / "euroc" / "MH_01_part").string(), kFast);
+  expect_no_heap_calls("euroc {}/euroc/MH_01_part", kFast);
 }
 
 TEST(RecordedThreads, APlantedMallocIsFound) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "no recordings in " << data_folder();
+  if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
   if (!test::heap_is_watched()) GTEST_SKIP() << "a sanitizer owns the heap";
   const test::Scratch scratch;
-  const std::string log = imported(scratch, "euroc " + (data_folder() / "euroc" / "MH_01_part").string());
-  ASSERT_FALSE(log.empty());
+  const std::string log = scratch.path("run.lcm");
+  ASSERT_TRUE(test::import_recording("euroc {}/euroc/MH_01_part", log));
   bool watched = false;
   ThreadHooks hooks = watch_from_settled(&watched);
   hooks.on_tracked = [](const slam::FrameResult&) {
@@ -116,10 +105,10 @@ void expect_same_file(const std::string& a, const std::string& b) {
 }
 
 TEST(RecordedThreads, ARecordedScheduleRepeatsTheRun) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "no recordings in " << data_folder();
+  if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
   const test::Scratch scratch;
-  const std::string log = imported(scratch, "euroc " + (data_folder() / "euroc" / "MH_01_part").string());
-  ASSERT_FALSE(log.empty());
+  const std::string log = scratch.path("run.lcm");
+  ASSERT_TRUE(test::import_recording("euroc {}/euroc/MH_01_part", log));
   const Options live = threaded(scratch, log);
   ASSERT_EQ(replay(live, quiet_config()), 0);
   Options again = live;

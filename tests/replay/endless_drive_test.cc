@@ -2,15 +2,18 @@
 // been.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "ipc/message.h"
+#include "tests/ipc/log_events.h"
+#include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
+#include "tools/evaluate/statistics.h"
 
 namespace farpoint::test {
 namespace {
@@ -44,36 +47,23 @@ void write_forth_and_back(const std::string& recording, std::size_t frames, cons
   writer.close();
 }
 
-std::vector<timing_t> timings_of(const std::string& output) {
-  std::vector<timing_t> out;
-  ipc::LogReader reader(output);
-  for (ipc::LogEvent event; reader.next(&event);) {
-    if (event.channel == ipc::kTimingChannel) {
-      EXPECT_TRUE(ipc::decode(event.data, &out.emplace_back()));
-    }
-  }
-  return out;
-}
-
 double tracking_p99_ms(const std::vector<timing_t>& timings, std::size_t first, std::size_t last) {
   std::vector<double> ms;
   for (std::size_t i = first; i < last; ++i)
     if (timings[i].cpu_ms[timing_t::STAGE_TRACKING] >= 0.0)
       ms.push_back(timings[i].cpu_ms[timing_t::STAGE_TRACKING]);
-  if (ms.empty()) return 0.0;
-  std::sort(ms.begin(), ms.end());
-  return ms[(ms.size() - 1) * 99 / 100];
+  return tools::percentile(std::move(ms), 99.0);
 }
 
 TEST(RecordedEndlessLong, MemoryAndTimeStayAsTheyAre) {
   if (!std::filesystem::exists(kData / "kitti")) GTEST_SKIP() << "no recording " << (kData / "kitti");
-  const WorkFolder work("endless_drive");
-  const std::string recording = work.file("recording.lcm"), drive = work.file("drive.lcm"),
-                    out = work.file("out.lcm");
-  ASSERT_EQ(run((kBin / "farpoint").string() + with_data(" import kitti {}/kitti 03 -o ") + recording), 0);
+  const Scratch work;
+  const std::string recording = work.path("recording.lcm"), drive = work.path("drive.lcm"),
+                    out = work.path("out.lcm");
+  ASSERT_TRUE(import_recording("kitti {}/kitti 03", recording));
   write_forth_and_back(recording, kFrames, drive);
   ASSERT_EQ(run((kBin / "farpointd").string() + " --replay " + drive + " --lockstep --output " + out), 0);
-  const std::vector<timing_t> timings = timings_of(out);
+  const std::vector<timing_t> timings = messages_of<timing_t>(out, ipc::kTimingChannel);
   ASSERT_EQ(timings.size(), kFrames);
   for (std::size_t i = 499; i < kFrames; i += 500)
     std::printf("%5zu frames: %.1f MB, tracking p99 %.2f ms\n", i + 1,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
 
 namespace farpoint::test {
@@ -23,14 +24,17 @@ struct Recording {
   bool may_say_nothing = false;  // no valid pose at all is as right an answer
 };
 
+const std::string kTumImport =
+    "tum {}/tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR "/config/cameras/tum-freiburg1.yaml";
+
 class RecordedAccuracy : public testing::TestWithParam<Recording> {};
 
 TEST_P(RecordedAccuracy, HoldsThePeersFigures) {
   const Recording& r = GetParam();
   if (!fs::exists(kData / r.folder)) GTEST_SKIP() << "no recording " << (kData / r.folder);
-  const WorkFolder work("recorded_" + r.name);
-  const std::string log = work.file("recording.lcm"), out = work.file(r.name + ".lcm");
-  ASSERT_EQ(run((kBin / "farpoint").string() + " import " + with_data(r.import) + " -o " + log), 0);
+  const Scratch work;
+  const std::string log = work.path("recording.lcm"), out = work.path(r.name + ".lcm");
+  ASSERT_TRUE(import_recording(r.import, log));
   ASSERT_EQ(run((kBin / "farpointd").string() + " --replay " + log + " --lockstep --output " + out), 0);
   const std::string evaluate =
       (kBin / "farpoint").string() + " evaluate " + out + " --truth " + log + " " + r.evaluate;
@@ -45,20 +49,16 @@ TEST_P(RecordedAccuracy, HoldsThePeersFigures) {
 // map and begins anew, so that most of the estimator runs.
 TEST(RecordedDeterminism, WhatFreshMemoryHoldsDoesNotMatter) {
   if (!fs::exists(kData / "tum")) GTEST_SKIP() << "no recording " << (kData / "tum");
-  const WorkFolder work("recorded_memory");
-  const std::string log = work.file("recording.lcm");
-  ASSERT_EQ(run((kBin / "farpoint").string() +
-                with_data(" import tum {}/tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR
-                          "/config/cameras/tum-freiburg1.yaml -o ") +
-                log),
-            0);
+  const Scratch work;
+  const std::string log = work.path("recording.lcm");
+  ASSERT_TRUE(import_recording(kTumImport, log));
   for (const char* fill : {"11", "85"}) {
     ASSERT_EQ(run(std::string("MALLOC_PERTURB_=") + fill + " " + (kBin / "farpointd").string() +
-                  " --replay " + log + " --lockstep --trajectory " + work.file(fill)),
+                  " --replay " + log + " --lockstep --trajectory " + work.path(fill)),
               0);
   }
-  EXPECT_EQ(run("test -s " + work.file("11")), 0);
-  EXPECT_EQ(run("cmp " + work.file("11") + " " + work.file("85")), 0);
+  EXPECT_EQ(run("test -s " + work.path("11")), 0);
+  EXPECT_EQ(run("cmp " + work.path("11") + " " + work.path("85")), 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -85,13 +85,7 @@ INSTANTIATE_TEST_SUITE_P(
                               "",
                               false},
                     // Almost pure rotation through a rolling shutter: whatever is called valid must be right.
-                    Recording{"tum_rpy",
-                              "tum",
-                              "tum {}/tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR
-                              "/config/cameras/tum-freiburg1.yaml",
-                              {"live.max_1s_rotation_deg <= 2"},
-                              "",
-                              true}),
+                    Recording{"tum_rpy", "tum", kTumImport, {"live.max_1s_rotation_deg <= 2"}, "", true}),
     [](const testing::TestParamInfo<Recording>& info) { return info.param.name; });
 
 }  // namespace

@@ -1,12 +1,12 @@
 // KITTI 03 with threads of their own, through the programs: memory, accuracy at the camera's pace,
 // repetition.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
 
 namespace farpoint::test {
@@ -21,20 +21,22 @@ class RecordedThreadsOfPrograms : public testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(kData / "kitti")) GTEST_SKIP() << "no recording " << (kData / "kitti");
-    ASSERT_EQ(run(farpoint + with_data(" import kitti {}/kitti 03 -o ") + log), 0);
+    ASSERT_TRUE(import_recording("kitti {}/kitti 03", log));
   }
-  // farpointd's status; its last line goes to `said`.
-  [[nodiscard]] int replay(const std::string& arguments) {
-    return run((kBin / "farpointd").string() + " --replay " + log + " " + arguments + " > " + said);
+  // farpointd's status; its last line goes to `said`. The others are shell commands around it.
+  [[nodiscard]] int replay(const std::string& arguments, const std::string& before = "",
+                           const std::string& afterwards = "") {
+    return run(before + (kBin / "farpointd").string() + " --replay " + log + " " + arguments + " > " + said +
+               "; status=$?; " + afterwards + "exit $status");
   }
   [[nodiscard]] int evaluate(const std::string& conditions) {
     return run(farpoint + " evaluate " + out + " --truth " + log + conditions);
   }
   [[nodiscard]] bool dropped_frames() { return run("grep dropped " + said) == 0; }
 
-  WorkFolder work{"recorded_threads"};
+  Scratch work;
   std::string farpoint = (kBin / "farpoint").string();
-  std::string log = work.file("recording.lcm"), out = work.file("out.lcm"), said = work.file("said.txt");
+  std::string log = work.path("recording.lcm"), out = work.path("out.lcm"), said = work.path("said.txt");
 };
 
 // Mapping on a loaded machine may be behind at this pace: the poses are another test's matter.
@@ -57,10 +59,7 @@ TEST_F(RecordedThreadsLong, FiveRunsHoldTheAccuracy) {
 TEST_F(RecordedThreadsLong, ALoadedCoreChangesNothing) {
   const std::string load = "timeout 400 sh -c 'while :; do :; done' & load=$!; ";
   for (int i = 0; i < 5; ++i) {
-    const std::string command = load + (kBin / "farpointd").string() + " --replay " + log +
-                                " --speed 1 --output " + out + " > " + said +
-                                "; status=$?; kill $load; exit $status";
-    ASSERT_EQ(run(command), 0);
+    ASSERT_EQ(replay("--speed 1 --output " + out, load, "kill $load; "), 0);
     EXPECT_FALSE(dropped_frames()) << "run " << i;
     EXPECT_EQ(evaluate(kConditions), 0) << "run " << i;
   }
@@ -68,14 +67,14 @@ TEST_F(RecordedThreadsLong, ALoadedCoreChangesNothing) {
 
 TEST_F(RecordedThreadsLong, ARecordedScheduleRepeatsTheRun) {
   const std::string files =
-      " --trajectory " + work.file("final.tum") + " --live-trajectory " + work.file("live.tum");
+      " --trajectory " + work.path("final.tum") + " --live-trajectory " + work.path("live.tum");
   const std::string again =
-      " --trajectory " + work.file("final2.tum") + " --live-trajectory " + work.file("live2.tum");
+      " --trajectory " + work.path("final2.tum") + " --live-trajectory " + work.path("live2.tum");
   ASSERT_EQ(replay("--speed 1 --output " + out + files), 0);
   ASSERT_EQ(
-      replay("--schedule recorded --schedule-log " + out + " --output " + work.file("again.lcm") + again), 0);
-  EXPECT_EQ(run("cmp " + work.file("final.tum") + " " + work.file("final2.tum")), 0);
-  EXPECT_EQ(run("cmp " + work.file("live.tum") + " " + work.file("live2.tum")), 0);
+      replay("--schedule recorded --schedule-log " + out + " --output " + work.path("again.lcm") + again), 0);
+  EXPECT_EQ(run("cmp " + work.path("final.tum") + " " + work.path("final2.tum")), 0);
+  EXPECT_EQ(run("cmp " + work.path("live.tum") + " " + work.path("live2.tum")), 0);
 }
 
 }  // namespace

@@ -23,24 +23,10 @@ inline std::string with_data(std::string text) {
   return at == std::string::npos ? text : text.replace(at, 2, kData.string());
 }
 
-// A folder of this name for one test, empty at first and gone at its end.
-class WorkFolder {
- public:
-  explicit WorkFolder(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() / ("farpoint_" + name)) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
+// Imports a recording as `file`: `arguments` of farpoint import, {} stands for the data folder. False where
+// it fails.
+inline bool import_recording(const std::string& arguments, const std::string& file) {
+  return run((kBin / "farpoint").string() + " import " + with_data(arguments) + " -o " + file) == 0;
+}
 
 }  // namespace farpoint::test

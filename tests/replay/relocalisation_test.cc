@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/ipc/scratch.h"
 #include "tests/replay/gaps.h"
 #include "tests/replay/recordings.h"
 
@@ -33,11 +34,9 @@ class RecordedGaps : public testing::TestWithParam<Recording> {
   void SetUp() override {
     if (!std::filesystem::exists(kData / GetParam().folder))
       GTEST_SKIP() << "no recording " << (kData / GetParam().folder);
-    const std::string command =
-        (kBin / "farpoint").string() + " import " + with_data(GetParam().import) + " -o " + log();
-    ASSERT_EQ(test::run(command), 0) << command;
+    ASSERT_TRUE(import_recording(GetParam().import, log()));
   }
-  std::string log() const { return work_.file("run.lcm"); }
+  std::string log() const { return work_.path("run.lcm"); }
 
   // `places` gaps up to `until_s`.
   Sum measure(int places, double until_s) const {
@@ -61,7 +60,7 @@ class RecordedGaps : public testing::TestWithParam<Recording> {
     return sum;
   }
 
-  const WorkFolder work_{"gaps_" + GetParam().name};
+  const Scratch work_;
 };
 
 TEST_P(RecordedGaps, EndInTheSameMap) {

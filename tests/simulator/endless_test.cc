@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <fstream>
 #include <vector>
 
@@ -26,20 +25,15 @@ double resident_mb() {
 class TrackingTime final : public slam::StageListener {
  public:
   void begin(slam::Stage stage) override {
-    if (stage == slam::Stage::kTracking) began_ms_ = now_ms();
+    if (stage == slam::Stage::kTracking) began_s_ = cpu_seconds();
   }
   void end(slam::Stage stage) override {
-    if (stage == slam::Stage::kTracking) ms.push_back(now_ms() - began_ms_);
+    if (stage == slam::Stage::kTracking) ms.push_back(1e3 * (cpu_seconds() - began_s_));
   }
   std::vector<double> ms;
 
  private:
-  static double now_ms() {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-  }
-  double began_ms_ = 0;
+  double began_s_ = 0;
 };
 
 double p99(const std::vector<double>& ms, std::size_t first, std::size_t last) {

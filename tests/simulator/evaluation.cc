@@ -14,13 +14,6 @@ using slam::SE3;
 
 namespace {
 
-// CPU time of this thread: other work on the machine does not count.
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 // The estimated path beside the true one.
 struct Paths {
   std::vector<std::uint32_t> frames;
@@ -90,6 +83,12 @@ void compare_landmarks(const slam::Estimator& estimator, const slam::MapTrajecto
 }
 
 }  // namespace
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 double quantile(std::vector<double> values, double p) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();

@@ -11,6 +11,9 @@ namespace farpoint::sim {
 // p in 0..1; NaN for no values. Linear between ranks.
 [[nodiscard]] double quantile(std::vector<double> values, double p);
 
+// CPU time of this thread: other work on the machine does not count.
+[[nodiscard]] double cpu_seconds();
+
 struct LandmarkError {
   double true_depth_m = 0;       // from its anchor
   double relative_error = 0;     // of the inverse depth, the run's one scale
