@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cmath>
 
+#include "drivers/foreign_threads.h"
 #include "drivers/pixel_conversion.h"
 
 namespace farpoint::drivers {
@@ -50,6 +51,7 @@ bool LibcameraCamera::next(int timeout_ms, ipc::GreyImage* image, CameraFrame* f
 // --- coming and going
 
 bool LibcameraCamera::open() {
+  limit_foreign_threads();  // libcamera starts some, and images pass through one of them
   const char* what = "";
   if (const int status = system_->open(options_.device.c_str(), &finished_, &what); status < 0) {
     const bool absent = status == -ENOENT || status == -ENODEV;

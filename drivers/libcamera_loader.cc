@@ -1,25 +1,15 @@
 #include "drivers/libcamera_loader.h"
 
 #include <dlfcn.h>
-#include <pthread.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
 
+#include "drivers/foreign_threads.h"
+
 namespace farpoint::drivers {
 namespace {
-
-// libcamera and what it pulls in start threads without saying how large their stacks are to be, and locked
-// memory means all of each: 8 MB by default. Farpoint's own threads say it themselves.
-void limit_stacks_of_others() {
-  constexpr std::size_t kStack_bytes = 1 << 20;
-  pthread_attr_t attributes;
-  if (pthread_attr_init(&attributes) != 0) return;
-  if (pthread_attr_setstacksize(&attributes, kStack_bytes) == 0)
-    (void)pthread_setattr_default_np(&attributes);
-  pthread_attr_destroy(&attributes);
-}
 
 // What the operator asked for stays; else errors alone: it looks for a lost camera once a second, and would
 // repeat its warnings as often.
@@ -42,7 +32,7 @@ std::string libcamera_module_path() {
 }
 
 std::unique_ptr<LibcameraSystem> load_libcamera(const std::string& path, std::string* problem) {
-  limit_stacks_of_others();
+  limit_foreign_threads();
   quieten_libcamera();
   void* module = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (module == nullptr) {
