@@ -35,7 +35,8 @@ double shared_error_weight(const BundleProblem& problem, const BundleProblem::Po
   double variance_px2 = 0.0;
   for (int i = 0; i < point.measurements; ++i) {
     const double sigma_px =
-        problem.measurements[static_cast<std::size_t>(point.first_measurement + i)].sigma_px;
+        problem.measurements[static_cast<std::size_t>(point.first_measurement) + static_cast<std::size_t>(i)]
+            .sigma_px;
     variance_px2 += sigma_px * sigma_px;
   }
   variance_px2 /= point.measurements;
@@ -79,7 +80,7 @@ KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body
     Eigen::Vector3d b = Eigen::Vector3d::UnitZ();
     // A corner without a ray (outside the lens circle) keeps a bearing that no epipolar search will match.
     if (!camera.unproject({f.u_px, f.v_px}, &b)) b = -Eigen::Vector3d::UnitZ();
-    k.bearings.push_back(b.cast<float>());
+    k.bearings.emplace_back(b.cast<float>());
   }
   const KeyframeHandle handle = map_.add_keyframe(std::move(k));
   if (!handle.is_null()) {
@@ -108,6 +109,7 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
     l.inverse_depth = p.inverse_depth;
     l.state = LandmarkState::kFull;
     l.created_keyframe = k2.id;
+    l.created_utime = k2.utime;
     const Eigen::Vector4d w = map_.world_point(l);
     l.creation_depth = (w.head<3>() / w[3] - k2.T_world_body.t).norm();
     Observation o;
