@@ -29,6 +29,7 @@ struct ControlConfig {
   std::string socket = "/run/farpoint/control";
 };
 
+enum class CameraDriverChoice { kV4l2, kLibcamera };
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kMjpeg };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
@@ -45,6 +46,7 @@ struct ExposureConfig {
 struct CameraConfig {
   int index = 0;  // which camera of the log, and of its calibration, is tracked
   // Live.
+  CameraDriverChoice driver = CameraDriverChoice::kV4l2;
   std::string device = "/dev/video0";
   std::string calibration = "/etc/farpoint/camera.yaml";
   CameraFormatChoice format = CameraFormatChoice::kAuto;

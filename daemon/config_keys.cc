@@ -92,6 +92,7 @@ std::vector<ConfigKey> make_keys() {
       text("control.socket", FIELD(control.socket)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
+      enumeration("camera.driver", {"v4l2", "libcamera"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
       enumeration("camera.format", {"auto", "grey", "nv12", "yuyv", "mjpeg"}, FIELD(camera.format)),

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "daemon/build_info.h"
+#include "daemon/camera_driver.h"
 #include "daemon/camera_file.h"
 #include "daemon/camera_source.h"
 #include "daemon/control_socket.h"
@@ -18,10 +19,6 @@
 #include "daemon/service_manager.h"
 #include "daemon/session.h"
 #include "daemon/stop_signal.h"
-#include "drivers/camera_path.h"
-#if FARPOINT_WITH_V4L2
-#include "drivers/v4l2_camera.h"
-#endif
 
 namespace farpoint::daemon {
 namespace {
@@ -48,18 +45,6 @@ drivers::ExposureOptions exposure_options(const ExposureConfig& c) {
   o.max_gain_share = c.max_gain_share;
   o.target_grey = c.target_grey;
   return o;
-}
-
-std::unique_ptr<drivers::Camera> make_camera(const Config& config, const calibration_t& calibration) {
-  const drivers::CameraOptions options = camera_options(config, calibration);
-  const std::string problem = drivers::CameraPath::check(options.device);
-  if (!problem.empty()) throw ConfigError("configuration: camera.device: " + problem);
-#if FARPOINT_WITH_V4L2
-  return std::make_unique<drivers::V4l2Camera>(options, std::make_unique<drivers::LinuxV4l2System>());
-#else
-  throw UsageError(
-      "this farpointd was built without a camera driver (-DFARPOINT_V4L2=ON), expected --replay");
-#endif
 }
 
 calibration_t read_calibration(const Config& config) {
@@ -136,7 +121,8 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
       config_(config),
       calibration_(read_calibration(config)),
       outputs_(options, config, Outputs::Use::kLive),
-      source_(camera ? std::move(camera) : make_camera(config, calibration_)),
+      source_(camera ? std::move(camera)
+                     : make_camera(config.camera.driver, camera_options(config, calibration_))),
       session_(open_session()),
       realtime_(config.realtime),
       pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
@@ -151,8 +137,8 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
 }
 
 std::unique_ptr<Session> LiveRun::open_session() {
-  spdlog::info("farpointd {}, configuration {:016x}, live from {}", build_text(), config_hash(config_),
-               config_.camera.device);
+  spdlog::info("farpointd {}, configuration {:016x}, live from {} {}", build_text(), config_hash(config_),
+               value_text(config_, "camera.driver"), config_.camera.device);
   // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
   config_.estimator.capacity.whole_trajectory = wants_results();
   return make_session(config_, calibration_, &outputs_, !options_.output.empty());

@@ -296,6 +296,17 @@ TEST_F(Live, WhatIsMissingIsSaidBeforeItStarts) {
   EXPECT_NE(complaint().find("camera.device: 'video0' names no camera, expected a path like /dev/video0"),
             std::string::npos)
       << complaint();
+  config_.camera.driver = CameraDriverChoice::kLibcamera;
+  config_.camera.device = "/dev/video0";
+#if FARPOINT_TEST_WITH_LIBCAMERA
+  EXPECT_NE(complaint().find("camera.device: '/dev/video0' names no camera of libcamera's, expected its id"),
+            std::string::npos)
+      << complaint();
+#else
+  EXPECT_NE(complaint().find("camera.driver: libcamera: this farpointd was built without it"),
+            std::string::npos)
+      << complaint();
+#endif
 }
 
 }  // namespace

@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
 
-#include <jpeglib.h>
-
 #include "tests/drivers/fake_v4l2.h"
+#include "tests/drivers/jpeg_images.h"
 #include "tests/ipc/allocations.h"
 
 namespace farpoint::drivers {
@@ -19,6 +17,7 @@ using test::fake_frame;
 using test::FakeCamera;
 using test::FakeFormat;
 using test::FakeFrame;
+using test::jpeg_of;
 
 constexpr int kTimeout_ms = 20;
 
@@ -189,30 +188,6 @@ TEST_F(V4l2CameraTest, ShortImagesAndBadJpegsAreDroppedAndCounted) {
   show(0);  // no JPEG
   EXPECT_FALSE(next());
   EXPECT_EQ(camera_->counts().undecodable, 1);
-}
-
-std::vector<std::uint8_t> jpeg_of(int width, int height, std::uint8_t grey) {
-  jpeg_compress_struct encoder{};
-  jpeg_error_mgr errors{};
-  encoder.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&encoder);
-  unsigned char* out = nullptr;
-  unsigned long bytes = 0;
-  jpeg_mem_dest(&encoder, &out, &bytes);
-  encoder.image_width = static_cast<JDIMENSION>(width);
-  encoder.image_height = static_cast<JDIMENSION>(height);
-  encoder.input_components = 1;
-  encoder.in_color_space = JCS_GRAYSCALE;
-  jpeg_set_defaults(&encoder);
-  jpeg_start_compress(&encoder, TRUE);
-  std::vector<std::uint8_t> row(static_cast<std::size_t>(width), grey);
-  for (JSAMPROW p = row.data(); encoder.next_scanline < encoder.image_height;)
-    jpeg_write_scanlines(&encoder, &p, 1);
-  jpeg_finish_compress(&encoder);
-  std::vector<std::uint8_t> file(out, out + bytes);
-  jpeg_destroy_compress(&encoder);
-  std::free(out);
-  return file;
 }
 
 TEST_F(V4l2CameraTest, MjpegIsDecoded) {

@@ -16,6 +16,7 @@ void add_bench_command(CLI::App* app, Action* action);
 void add_ctl_command(CLI::App* app, Action* action);
 void add_top_command(CLI::App* app, Action* action);
 void add_report_command(CLI::App* app, Action* action);
+void add_spy_command(CLI::App* app, Action* action);
 void add_simulate_command(CLI::App* app, Action* action);
 
 // The whole program: parses, runs, and turns every failure into one line on standard error and an exit

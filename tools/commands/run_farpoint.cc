@@ -60,6 +60,7 @@ int run_farpoint(int argc, const char* const* argv) {
   add_bench_command(&app, &action);
   add_ctl_command(&app, &action);
   add_top_command(&app, &action);
+  add_spy_command(&app, &action);
   add_report_command(&app, &action);
   add_simulate_command(&app, &action);
   const std::string unknown = unknown_command(app, argc, argv);

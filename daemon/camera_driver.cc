@@ -1,0 +1,60 @@
+#include "daemon/camera_driver.h"
+
+#if FARPOINT_WITH_V4L2
+#include "drivers/v4l2_camera.h"
+#endif
+#if FARPOINT_WITH_LIBCAMERA
+#include "drivers/libcamera_camera.h"
+#include "drivers/libcamera_loader.h"
+#endif
+
+namespace farpoint::daemon {
+namespace {
+
+void require_name(const std::string& problem) {
+  if (!problem.empty()) throw ConfigError("configuration: camera.device: " + problem);
+}
+
+#if !FARPOINT_WITH_V4L2 || !FARPOINT_WITH_LIBCAMERA
+[[noreturn]] void fail_not_built(const std::string& driver, const std::string& option) {
+  throw ConfigError("configuration: camera.driver: " + driver + ": this farpointd was built without it (-D" +
+                    option + "=ON, and its packages), expected another driver or --replay");
+}
+#endif
+
+std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::CameraOptions& options) {
+#if FARPOINT_WITH_V4L2
+  require_name(drivers::CameraPath::check(options.device));
+  return std::make_unique<drivers::V4l2Camera>(options, std::make_unique<drivers::LinuxV4l2System>());
+#else
+  fail_not_built("v4l2", "FARPOINT_V4L2");
+#endif
+}
+
+std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::CameraOptions& options) {
+#if FARPOINT_WITH_LIBCAMERA
+  require_name(drivers::LibcameraCamera::check(options.device));
+  std::string problem;
+  auto system = drivers::load_libcamera(drivers::libcamera_module_path(), &problem);
+  if (!system)
+    throw ConfigError("configuration: camera.driver: libcamera: its module cannot be loaded: " + problem);
+  return std::make_unique<drivers::LibcameraCamera>(options, std::move(system));
+#else
+  fail_not_built("libcamera", "FARPOINT_LIBCAMERA");
+#endif
+}
+
+}  // namespace
+
+std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver,
+                                             const drivers::CameraOptions& options) {
+  switch (driver) {
+    case CameraDriverChoice::kV4l2:
+      return make_v4l2(options);
+    case CameraDriverChoice::kLibcamera:
+      return make_libcamera(options);
+  }
+  return nullptr;
+}
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,74 @@
+// From libcamera's thread to the capture thread: which requests are finished, and that the camera was
+// removed.
+//
+// libcamera's signals only do this much. The ring is fixed: a request is in it at most once, so it cannot
+// overflow. Nobody waits for anybody; the capture thread waits for fd() to become readable.
+#pragma once
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace farpoint::drivers {
+
+class FinishedRequests {
+ public:
+  static constexpr std::uint32_t kMaxRequests = 16;
+
+  FinishedRequests() : fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC | EFD_SEMAPHORE)) {}
+  ~FinishedRequests() { close(fd_); }
+  FinishedRequests(const FinishedRequests&) = delete;
+  FinishedRequests& operator=(const FinishedRequests&) = delete;
+
+  // libcamera's thread. False where somebody broke the promise of the ring: then nothing was stored.
+  bool push(std::uint32_t request) {
+    const std::uint32_t end = end_.load(std::memory_order_relaxed);
+    if (request >= kMaxRequests || end - begin_.load(std::memory_order_acquire) >= kMaxRequests) return false;
+    ring_.at(end % kMaxRequests) = request;
+    end_.store(end + 1, std::memory_order_release);
+    wake();
+    return true;
+  }
+  // libcamera's thread.
+  void set_removed() {
+    removed_.store(true, std::memory_order_release);
+    wake();
+  }
+
+  // The capture thread, all below. Readable while something is there to be taken.
+  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] bool was_removed() const { return removed_.load(std::memory_order_acquire); }
+  // The oldest; false where there is none.
+  [[nodiscard]] bool take(std::uint32_t* request) {
+    std::uint64_t one = 0;
+    if (read(fd_, &one, sizeof one) < 0) return false;
+    const std::uint32_t begin = begin_.load(std::memory_order_relaxed);
+    if (begin == end_.load(std::memory_order_acquire)) return false;
+    *request = ring_.at(begin % kMaxRequests);
+    begin_.store(begin + 1, std::memory_order_release);
+    return true;
+  }
+  // While nothing can push.
+  void clear() {
+    for (std::uint64_t one = 0; read(fd_, &one, sizeof one) > 0;) continue;
+    begin_.store(end_.load());
+    removed_.store(false);
+  }
+
+ private:
+  // The descriptor counts one for each thing to be taken. It is non-blocking, and cannot fill up.
+  void wake() {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+  }
+
+  int fd_;
+  std::array<std::uint32_t, kMaxRequests> ring_{};
+  std::atomic<std::uint32_t> begin_{0}, end_{0};
+  std::atomic<bool> removed_{false};
+};
+
+}  // namespace farpoint::drivers
