@@ -107,7 +107,8 @@ bool acceptable(const ConfigKey& key, const std::string& text, bool quoted) {
   switch (key.type) {
     case KeyType::kInteger: {
       const auto value = parse_all<long long>(text);
-      return !quoted && value && double(*value) >= key.min && double(*value) <= key.max;
+      return !quoted && value && static_cast<double>(*value) >= key.min &&
+             static_cast<double>(*value) <= key.max;
     }
     case KeyType::kNumber: {
       const auto value = parse_all<double>(text);

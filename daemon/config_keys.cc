@@ -27,7 +27,8 @@ T parse_checked(const std::string& text) {
 
 template <typename Field>
 ConfigKey integer(const char* name, const char* unit, int min, int max, Field field) {
-  ConfigKey key{name, KeyType::kInteger, unit, double(min), double(max), {}, {}, {}};
+  ConfigKey key{name, KeyType::kInteger, unit, static_cast<double>(min), static_cast<double>(max), {}, {},
+                {}};
   key.get = [field](const Config& c) { return std::to_string(field(c)); };
   key.set = [field](Config& c, const std::string& text) { field(c) = parse_checked<int>(text); };
   return key;

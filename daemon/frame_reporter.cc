@@ -157,7 +157,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
 void FrameReporter::note_state(const slam::FrameResult& result) {
   if (result.state == last_state_) return;
   spdlog::debug("frame {} at {:.6f} s: {} -> {} (map {}, {} of {} features matched, {} agree)",
-                result.sequence, 1e-6 * double(result.utime), slam::to_string(last_state_),
+                result.sequence, 1e-6 * static_cast<double>(result.utime), slam::to_string(last_state_),
                 slam::to_string(result.state), result.map_id, result.matches, result.features,
                 result.inliers);
   last_state_ = result.state;

@@ -11,7 +11,7 @@ namespace farpoint::daemon {
 namespace {
 
 double percent(std::int64_t part, std::int64_t whole) {
-  return whole > 0 ? 100.0 * double(part) / double(whole) : 0.0;
+  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
 const char* outcome(const RunEnd& end) {
@@ -64,8 +64,8 @@ std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t fra
       "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}",
       outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames), maps,
       maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s", scale_text(end.last.scale),
-      cpu_ms.empty() ? 0.0 : sum_ms / double(cpu_ms.size()), quantile(cpu_ms, 0.99),
-      double(peak_resident_bytes()) / kMegabyte, refused_text(in, frames_dropped),
+      cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()), quantile(cpu_ms, 0.99),
+      static_cast<double>(peak_resident_bytes()) / kMegabyte, refused_text(in, frames_dropped),
       written.empty() ? "" : "; wrote ", fmt::join(written, " "));
 }
 

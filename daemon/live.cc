@@ -139,6 +139,8 @@ LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<d
 std::unique_ptr<Session> LiveRun::open_session() {
   spdlog::info("farpointd {}, configuration {:016x}, live from {} {}", build_text(), config_hash(config_),
                value_text(config_, "camera.driver"), config_.camera.device);
+  // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
+  config_.estimator.capacity.whole_trajectory = wants_results();
   return make_session(config_, calibration_, &outputs_, !options_.output.empty());
 }
 

@@ -36,7 +36,7 @@ LogFrameSource::LogFrameSource(const std::string& path, int camera_index)
     : name_(path == "-" ? "standard input" : path), camera_index_(camera_index), source_(open_source(path)) {
   std::error_code error;
   const auto bytes = std::filesystem::file_size(path, error);
-  if (path != "-" && !error) file_bytes_ = double(bytes);
+  if (path != "-" && !error) file_bytes_ = static_cast<double>(bytes);
 }
 
 bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
@@ -109,7 +109,7 @@ InputCounts LogFrameSource::counts() const {
 }
 
 double LogFrameSource::progress() const {
-  return file_bytes_ > 0.0 ? double(offset_) / file_bytes_ : -1.0;
+  return file_bytes_ > 0.0 ? static_cast<double>(offset_) / file_bytes_ : -1.0;
 }
 
 }  // namespace farpoint::daemon

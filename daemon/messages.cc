@@ -69,7 +69,7 @@ map_summary_t make_map_summary(const RunEnd& end, std::size_t index) {
   m.observation_distance_p90 = quantile(distances, 0.9) * end.unit_scale;
   m.nquantiles = distances.empty() ? 0 : kQuantiles;
   for (int i = 0; i < m.nquantiles; ++i) {
-    const double q = double(i) / (kQuantiles - 1);
+    const double q = static_cast<double>(i) / (kQuantiles - 1);
     m.observation_distance_quantile.push_back(static_cast<float>(quantile(distances, q) * end.unit_scale));
   }
   return m;
@@ -280,10 +280,10 @@ summary_t make_summary(const RunEnd& end, const Config& config) {
 
 double quantile(std::span<const double> sorted, double q) {
   if (sorted.empty()) return kNan;
-  const double position = q * double(sorted.size() - 1);
+  const double position = q * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(position);
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  const double share = position - double(below);
+  const double share = position - static_cast<double>(below);
   return sorted[below] + share * (sorted[above] - sorted[below]);
 }
 

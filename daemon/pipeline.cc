@@ -37,8 +37,9 @@ Pipeline::Pipeline(const Config& config, const PipelineOptions& options, Capture
       counts_of_absence_(4) {
   constexpr double kMegabyte = 1e6;
   const std::size_t rings = kPackages * sizeof(FramePackage) + kNotes * sizeof(Note);
-  spdlog::info("memory {:<32} {:>9.3f} MB", "captured images", double(images_.bytes()) / kMegabyte);
-  spdlog::info("memory {:<32} {:>9.3f} MB", "rings of the output", double(rings) / kMegabyte);
+  spdlog::info("memory {:<32} {:>9.3f} MB", "captured images",
+               static_cast<double>(images_.bytes()) / kMegabyte);
+  spdlog::info("memory {:<32} {:>9.3f} MB", "rings of the output", static_cast<double>(rings) / kMegabyte);
   spdlog::info("memory {:<32} {:>9.3f} MB", "stacks of four threads",
                4.0 * config_.stack_kb * 1024 / kMegabyte);
 }

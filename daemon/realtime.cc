@@ -176,7 +176,7 @@ void Thread::join() {
 double Thread::cpu_s() const {
   timespec t{};
   clock_gettime(clock_, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 void* Thread::enter(void* self) {

@@ -37,7 +37,7 @@ const RecordedChance* Schedule::take(std::int64_t utime) {
     throw InputError(
         fmt::format("{}: the schedule has a frame at {:.6f} s, the replayed log has none there; "
                     "expected the log of the recorded run",
-                    log_, 1e-6 * double(entries_[next_].utime)));
+                    log_, 1e-6 * static_cast<double>(entries_[next_].utime)));
   }
   return &entries_[next_++].recorded;
 }
@@ -48,7 +48,7 @@ void Schedule::check(const slam::FrameResult& result) const {
   throw InputError(
       fmt::format("{}: the frame at {:.6f} s knew {} results of mapping and gave job {}, now {} "
                   "and {}; expected the configuration and the build of the recorded run",
-                  log_, 1e-6 * double(entry.utime), entry.recorded.replies_taken, entry.job,
+                  log_, 1e-6 * static_cast<double>(entry.utime), entry.recorded.replies_taken, entry.job,
                   result.replies_taken, result.job));
 }
 

@@ -28,8 +28,8 @@ std::size_t sum_bytes(const MemoryTable& table) {
 void print_memory_table(const MemoryTable& table, std::size_t sum) {
   constexpr double kMegabyte = 1e6;
   for (const auto& [name, bytes] : table)
-    spdlog::info("memory {:<32} {:>9.3f} MB", name, double(bytes) / kMegabyte);
-  spdlog::info("memory {:<32} {:>9.3f} MB", "in all", double(sum) / kMegabyte);
+    spdlog::info("memory {:<32} {:>9.3f} MB", name, static_cast<double>(bytes) / kMegabyte);
+  spdlog::info("memory {:<32} {:>9.3f} MB", "in all", static_cast<double>(sum) / kMegabyte);
 }
 
 void print_calibration(const slam::CalibrationInfo& c) {

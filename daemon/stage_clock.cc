@@ -14,7 +14,7 @@ namespace {
 double clock_s(clockid_t id) {
   timespec t{};
   clock_gettime(id, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 // Adds to a time that is negative until the stage runs.
@@ -119,7 +119,7 @@ timing_t StageClock::message(std::int64_t utime, std::int64_t sequence, std::int
   m.sequence = sequence;
   std::copy(cpu_ms_.begin(), cpu_ms_.end(), m.cpu_ms);
   std::copy(wall_ms_.begin(), wall_ms_.end(), m.wall_ms);
-  m.latency_ms = age_us > 0 ? 1e-3 * double(age_us) : -1.0;
+  m.latency_ms = age_us > 0 ? 1e-3 * static_cast<double>(age_us) : -1.0;
   m.deadline_ms = 0.0;
   m.process_cpu_s = process_cpu_s();
   m.resident_bytes = resident_bytes();

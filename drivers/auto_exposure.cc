@@ -31,7 +31,7 @@ ExposureSetting AutoExposure::setting() const {
   const double beyond_gain = std::max(0.0, demand_stops_ - short_stops - gain_stops_);
   ExposureSetting s;
   s.exposure_us = std::exp2(log_min_ + std::min(demand_stops_, short_stops) + beyond_gain);
-  const double steps = beyond_short / kGainStops * double(range_.gain_max - range_.gain_min);
+  const double steps = beyond_short / kGainStops * static_cast<double>(range_.gain_max - range_.gain_min);
   s.gain = range_.gain_min + static_cast<int>(std::lround(steps));
   return s;
 }

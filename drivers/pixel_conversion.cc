@@ -52,7 +52,7 @@ double mean_grey(const ipc::GreyImage& image) {
     const std::uint8_t* row = image.data() + static_cast<std::ptrdiff_t>(y) * image.width_px;
     for (int x = kStep / 2; x < image.width_px; x += kStep, ++count) sum += row[x];
   }
-  return count > 0 ? double(sum) / double(count) : 0.0;
+  return count > 0 ? static_cast<double>(sum) / static_cast<double>(count) : 0.0;
 }
 
 }  // namespace farpoint::drivers

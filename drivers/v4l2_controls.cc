@@ -45,8 +45,8 @@ bool V4l2Exposure::take_manual_control() {
     return false;
   std::int64_t min = 0, max = 0;
   if (!query(V4L2_CID_EXPOSURE_ABSOLUTE, &min, &max)) return false;
-  range_.min_us = kExposureUnit_us * double(std::max<std::int64_t>(min, 1));
-  range_.max_us = kExposureUnit_us * double(std::max<std::int64_t>(max, 1));
+  range_.min_us = kExposureUnit_us * static_cast<double>(std::max<std::int64_t>(min, 1));
+  range_.max_us = kExposureUnit_us * static_cast<double>(std::max<std::int64_t>(max, 1));
   set(V4L2_CID_AUTOGAIN, 0);
   has_gain_ = query(V4L2_CID_GAIN, &min, &max);
   if (has_gain_) {
@@ -60,7 +60,7 @@ void V4l2Exposure::apply(const ExposureSetting& setting) {
   applied_ = setting;
   const double exposure_us = std::clamp(setting.exposure_us, range_.min_us, range_.max_us);
   const auto units = static_cast<std::int64_t>(std::llround(exposure_us / kExposureUnit_us));
-  if (set(V4L2_CID_EXPOSURE_ABSOLUTE, units)) exposure_us_ = kExposureUnit_us * double(units);
+  if (set(V4L2_CID_EXPOSURE_ABSOLUTE, units)) exposure_us_ = kExposureUnit_us * static_cast<double>(units);
   if (!has_gain_) return;
   const int gain = std::clamp(setting.gain, range_.gain_min, range_.gain_max);
   if (set(V4L2_CID_GAIN, gain)) gain_ = gain;

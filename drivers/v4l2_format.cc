@@ -62,7 +62,9 @@ bool may_have_size(V4l2System* system, const V4l2Node& node, std::uint32_t code,
 }
 
 double rate_of(const v4l2_fract& interval) {
-  return interval.numerator > 0 ? double(interval.denominator) / double(interval.numerator) : 0.0;
+  return interval.numerator > 0
+             ? static_cast<double>(interval.denominator) / static_cast<double>(interval.numerator)
+             : 0.0;
 }
 
 // 0 where the driver does not say.

@@ -36,6 +36,8 @@ struct CapacityConfig {
   int observations_per_landmark = 48;  // beyond it the oldest in between are thinned out
   int window_images = 24;              // keyframes that keep their pyramid for alignment
   int view_landmarks = 6000;           // that tracking is shown at once
+  // Where every frame and removed keyframe stood is kept for trajectories(): memory grows with the way.
+  bool whole_trajectory = true;
 };
 
 struct InitialisationConfig {

@@ -172,7 +172,7 @@ std::vector<LandmarkInfo> Estimator::landmarks() const {
     i.anchor_camera = l.host_camera;
     i.anchor_pixel = l.host_pixel;
     i.anchor_map = map.T_world_anchor(l).t;
-    i.created_utime = map.utime_of(l.created_keyframe);
+    i.created_utime = l.created_utime;
     std::memcpy(&i.tag, l.patch.pixels.data(), sizeof(i.tag));
     out.push_back(i);
   });

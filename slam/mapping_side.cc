@@ -11,7 +11,7 @@ MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange
 
 void MappingSide::collect_recorded() {
   while (const RecordedFrame* frame = exchange_.recorded.front()) {
-    append_in_steps(*frame, &recorded_);
+    if (config_.capacity.whole_trajectory) append_in_steps(*frame, &recorded_);
     exchange_.recorded.pop();
   }
 }

@@ -31,6 +31,7 @@ class MappingSide {
   void collect_recorded();
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
+  // Empty without capacity.whole_trajectory.
   [[nodiscard]] const std::vector<RecordedFrame>& recorded() const { return recorded_; }
   // Of the tracker that poses frames afterwards.
   [[nodiscard]] std::size_t tracker_bytes() const { return poser_.bytes(); }

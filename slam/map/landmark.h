@@ -57,6 +57,7 @@ struct Landmark {
 
   // Statistics for culling and reports.
   std::uint64_t created_keyframe = 0;  // id of the keyframe at which it was made (bearing) or promoted
+  std::int64_t created_utime = 0;      // of that keyframe
   std::uint64_t last_seen_keyframe = 0;
   std::uint32_t visible = 1, found = 1;  // frames in which it should have been, and was, seen
   std::uint8_t failures = 0;             // failed promotions

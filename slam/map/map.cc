@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "slam/map/grow.h"
-
 namespace farpoint::slam {
 
 Map::Map(const CapacityConfig& capacity, const Rig& rig)
@@ -23,7 +21,7 @@ KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   slot.landmarks.assign(slot.set.features.size(), {});
   slot.covisible.clear();
   slot.optimised = 0;
-  append_in_steps(SkeletonNode{handle, 0, {}, true, slot.utime}, &skeleton_);
+  add_to_skeleton(handle);
   return handle;
 }
 
@@ -46,12 +44,14 @@ void Map::remove_keyframe(KeyframeHandle handle) {
       if (gap < best) best = gap, parent = h;
     });
   }
-  SkeletonNode& node = skeleton_[keyframe.id - 1];
-  node.alive = {};
-  node.known = !parent.is_null();
-  if (node.known) {
-    node.parent_id = keyframes_[parent].id;
-    node.T_parent_this = keyframes_[parent].T_world_body.inverse() * keyframe.T_world_body;
+  if (keyframe.id >= first_in_skeleton_) {
+    SkeletonNode& node = skeleton_[keyframe.id - first_in_skeleton_];
+    node.alive = {};
+    node.known = !parent.is_null();
+    if (node.known) {
+      node.parent_id = keyframes_[parent].id;
+      node.T_parent_this = keyframes_[parent].T_world_body.inverse() * keyframe.T_world_body;
+    }
   }
   for (const LandmarkHandle& l : keyframe.landmarks)
     if (landmarks_.contains(l)) remove_observation(l, handle);
@@ -113,6 +113,7 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   l.descriptor = keyframe.set.descriptors[feature];
   l.host_level = f.level;
   l.created_keyframe = l.last_seen_keyframe = keyframe.id;
+  l.created_utime = keyframe.utime;
   l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F});
   keyframe.landmarks[feature] = handle;
   return handle;
@@ -303,19 +304,38 @@ void Map::update_covisibility(KeyframeHandle handle) {
   std::sort(keyframe.covisible.begin(), keyframe.covisible.end(), stronger);
 }
 
+void Map::add_to_skeleton(KeyframeHandle keyframe) {
+  skeleton_.push_back({keyframe, 0, {}, true});
+  // Whoever asks for a removed keyframe's pose has seen it lately: tracking, some views ago.
+  if (capacity_.whole_trajectory || skeleton_.size() <= 2 * keyframes_.capacity()) return;
+  skeleton_.pop_front();
+  ++first_in_skeleton_;
+}
+
+const Map::SkeletonNode* Map::skeleton_node(std::uint64_t id) const {
+  const std::uint64_t at = id - first_in_skeleton_;  // huge where it lies before
+  return at < skeleton_.size() ? &skeleton_[at] : nullptr;
+}
+
 bool Map::pose_of(std::uint64_t id, SE3* T_world_body) const {
   SE3 tail;
-  while (id != 0 && id <= skeleton_.size()) {
-    const SkeletonNode& node = skeleton_[id - 1];
-    if (!node.known) return false;
-    if (const Keyframe* k = keyframes_.get(node.alive)) {
+  while (const SkeletonNode* node = skeleton_node(id)) {
+    if (!node->known) return false;
+    if (const Keyframe* k = keyframes_.get(node->alive)) {
       *T_world_body = k->T_world_body * tail;
       return true;
     }
-    tail = node.T_parent_this * tail;
-    id = node.parent_id;
+    tail = node->T_parent_this * tail;
+    id = node->parent_id;
   }
-  return false;
+  // A keyframe may outlive its place in the skeleton.
+  bool found = false;
+  keyframes_.for_each([&](KeyframeHandle, const Keyframe& k) {
+    if (k.id != id) return;
+    *T_world_body = k.T_world_body * tail;
+    found = true;
+  });
+  return found;
 }
 
 void Map::discard_map(std::int32_t map_id) {

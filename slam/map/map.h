@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <vector>
 
 #include "slam/config.h"
@@ -69,13 +70,9 @@ class Map {
 
   // --- the way home
   // -------------------------------------------------------------------------------------------- Pose of any
-  // keyframe ever made in a living map by its id, also of removed ones; false where it is unknown.
+  // keyframe ever made in a living map by its id, also of removed ones (without capacity.whole_trajectory
+  // only those of late); false where it is unknown.
   [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const;
-
-  // When any keyframe ever made was taken, by its id. Precondition: there has been such a keyframe.
-  [[nodiscard]] std::int64_t utime_of(std::uint64_t keyframe_id) const {
-    return skeleton_[keyframe_id - 1].utime;
-  }
 
   // Everything of one map goes (a map that never came to life).
   void discard_map(std::int32_t map_id);
@@ -93,9 +90,11 @@ class Map {
     std::uint64_t parent_id = 0;
     SE3 T_parent_this;
     bool known = false;
-    std::int64_t utime = 0;  // of the keyframe
   };
 
+  void add_to_skeleton(KeyframeHandle keyframe);
+  // Null where the skeleton no longer reaches back so far.
+  [[nodiscard]] const SkeletonNode* skeleton_node(std::uint64_t keyframe_id) const;
   bool set_bearing(Landmark* landmark) const;
   void detach_feature(const Observation& observation);
   // Keeps the largest parallax and who gives it.
@@ -106,7 +105,8 @@ class Map {
   Rig rig_;
   Pool<Keyframe> keyframes_;
   Pool<Landmark> landmarks_;
-  std::vector<SkeletonNode> skeleton_;  // by keyframe id - 1
+  std::deque<SkeletonNode> skeleton_;  // by keyframe id, from first_in_skeleton_ on
+  std::uint64_t first_in_skeleton_ = 1;
   std::uint64_t next_keyframe_id_ = 1;
   std::uint64_t next_landmark_id_ = 1;
   std::vector<int> shared_count_;  // scratch of update_covisibility, one a keyframe slot

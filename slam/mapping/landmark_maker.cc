@@ -193,6 +193,7 @@ void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const Pai
   Landmark& l = map_.landmarks()[handle];
   l.inverse_depth = first.ok ? std::max(0.0, first.inverse_depth) : 0.0;
   l.created_keyframe = k_new.id;
+  l.created_utime = k_new.utime;
   Observation o;
   if (!measure_observation(config_, map_, l, newer, pair.feature_new, &o) ||
       !map_.add_observation(handle, o)) {
@@ -370,7 +371,10 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   }
   l.state = l.observations.size() > 2 ? LandmarkState::kFull : LandmarkState::kWeak;
   l.through_vmp = through_vmp;
-  l.created_keyframe = std::max(l.created_keyframe, k.id);
+  if (k.id > l.created_keyframe) {
+    l.created_keyframe = k.id;
+    l.created_utime = k.utime;
+  }
   l.creation_depth = 1.0 / (scale_change * l.inverse_depth);
   l.creation_relative_sigma = fit.sigma / fit.inverse_depth;
   ++counts_.landmarks_made;

@@ -28,18 +28,23 @@ constexpr std::size_t kViews = 5;
 // pixels, a surface that is not as flat as it was taken for. That part, so large (1 sigma), does not average
 // out.
 constexpr double kPatchSigma_px = 0.2;
+// What stays a virtual point is far away, and may move by itself in the seconds that it is seen: clouds drift
+// by 1 to 2 mrad a second. In the whole of its measurements that looks like parallax, a hundred clouds look
+// like a vehicle that is slower than it is, and the scale gave way to them by up to 4 %.
+constexpr double kOwnMotion_rad = 0.003;
 
 // n measurements of independent errors sigma and one common error s know their mean to sigma^2 / n + s^2: as
 // much as n with this weight would, were they independent.
-double shared_error_weight(const BundleProblem& problem, const BundleProblem::Point& point) {
+double shared_error_weight(const BundleProblem& problem, const BundleProblem::Point& point,
+                           double shared_sigma_px) {
   double variance_px2 = 0.0;
   for (int i = 0; i < point.measurements; ++i) {
-    const double sigma_px =
-        problem.measurements[static_cast<std::size_t>(point.first_measurement + i)].sigma_px;
+    const int index = point.first_measurement + i;
+    const double sigma_px = problem.measurements[static_cast<std::size_t>(index)].sigma_px;
     variance_px2 += sigma_px * sigma_px;
   }
   variance_px2 /= point.measurements;
-  return variance_px2 / (variance_px2 + point.measurements * kPatchSigma_px * kPatchSigma_px);
+  return variance_px2 / (variance_px2 + point.measurements * shared_sigma_px * shared_sigma_px);
 }
 
 std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
@@ -79,7 +84,7 @@ KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body
     Eigen::Vector3d b = Eigen::Vector3d::UnitZ();
     // A corner without a ray (outside the lens circle) keeps a bearing that no epipolar search will match.
     if (!camera.unproject({f.u_px, f.v_px}, &b)) b = -Eigen::Vector3d::UnitZ();
-    k.bearings.push_back(b.cast<float>());
+    k.bearings.emplace_back(b.cast<float>());
   }
   const KeyframeHandle handle = map_.add_keyframe(std::move(k));
   if (!handle.is_null()) {
@@ -108,6 +113,7 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
     l.inverse_depth = p.inverse_depth;
     l.state = LandmarkState::kFull;
     l.created_keyframe = k2.id;
+    l.created_utime = k2.utime;
     const Eigen::Vector4d w = map_.world_point(l);
     l.creation_depth = (w.head<3>() / w[3] - k2.T_world_body.t).norm();
     Observation o;
@@ -325,9 +331,8 @@ void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
 
 bool Mapper::holds_pose(const Landmark& landmark) const {
   // A virtual point's inverse depth is known within its sigma, and that is how BA (free, at least 0) and
-  // tracking (the residual's covariance) take it: across its epipolar line it says as much about rotation as
-  // a point does. (ours; the paper uses virtual points once they are points.) Two sightings agree with any
-  // mismatch along the line.
+  // tracking (the residual's covariance) take it: it says something about rotation. (ours; the paper uses
+  // virtual points once they are points.) Two sightings agree with any mismatch along the line.
   if (landmark.state != LandmarkState::kBearing) return true;
   return landmark.failures == 0 &&
          static_cast<int>(landmark.observations.size()) >= config_.landmarks.bearing_observations;
@@ -411,7 +416,10 @@ void Mapper::build_problem() {
     }
     point.measurements = static_cast<int>(problem_.measurements.size()) - point.first_measurement;
     if (point.measurements == 0) continue;
-    point.weight = shared_error_weight(problem_, point);
+    const double own_motion_px =
+        kOwnMotion_rad * map_.rig().cameras[static_cast<std::size_t>(l.host_camera)].camera.focal_px();
+    point.weight = shared_error_weight(problem_, point,
+                                       l.state == LandmarkState::kBearing ? own_motion_px : kPatchSigma_px);
     problem_.points.push_back(point);
     problem_landmarks_[kept++] = lh;
   }

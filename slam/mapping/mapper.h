@@ -57,7 +57,7 @@ class Mapper {
   void fuse(LandmarkHandle into, LandmarkHandle from);
   // Whether its sightings take part in poses: in BA and in the view that tracking gets.
   [[nodiscard]] bool holds_pose(const Landmark& landmark) const;
-  void search_into(KeyframeHandle keyframe, const std::vector<LandmarkHandle>& landmarks);
+  void search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks);
 
   void optimise(KeyframeHandle centre, int iterations);
   void select_window(KeyframeHandle centre);

@@ -77,12 +77,13 @@ int expect_right(const std::vector<pose_t>& poses, const Times& damaged_times = 
     // Least squares of position = a + b t, about the middle.
     double t_mean = 0.0;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero(), slope = Eigen::Vector3d::Zero();
-    for (const pose_t* p : of_map) t_mean += 1e-6 * double(p->utime) / double(of_map.size());
     for (const pose_t* p : of_map)
-      mean += Eigen::Map<const Eigen::Vector3d>(p->position) / double(of_map.size());
+      t_mean += 1e-6 * static_cast<double>(p->utime) / static_cast<double>(of_map.size());
+    for (const pose_t* p : of_map)
+      mean += Eigen::Map<const Eigen::Vector3d>(p->position) / static_cast<double>(of_map.size());
     double spread = 0.0;
     for (const pose_t* p : of_map) {
-      const double t = 1e-6 * double(p->utime) - t_mean;
+      const double t = 1e-6 * static_cast<double>(p->utime) - t_mean;
       slope += t * (Eigen::Map<const Eigen::Vector3d>(p->position) - mean);
       spread += t * t;
     }
@@ -90,7 +91,7 @@ int expect_right(const std::vector<pose_t>& poses, const Times& damaged_times = 
     // A step is what the camera moves in one of its periods. Undamaged, the farthest lie 0.2 steps off.
     const double step = 0.1 * slope.norm();
     for (const pose_t* p : of_map) {
-      const Eigen::Vector3d line = mean + (1e-6 * double(p->utime) - t_mean) * slope;
+      const Eigen::Vector3d line = mean + (1e-6 * static_cast<double>(p->utime) - t_mean) * slope;
       const double off = (Eigen::Map<const Eigen::Vector3d>(p->position) - line).norm() / step;
       const double turned_deg = 2.0 * std::acos(std::min(1.0, std::abs(p->orientation[0]))) / kDegree;
       EXPECT_LE(off, 0.5) << "steps, map " << id << " at " << p->utime;
@@ -164,7 +165,7 @@ TEST_F(BadInput, BlackFramesAreNotValidAndTheWayBackIsFound) {
   EXPECT_EQ(r.poses.size(), std::size_t{kFrames});
   for (int i = 30; i < 40; ++i) {
     EXPECT_EQ(r.at(time_of(i)).valid, 0) << i;
-    EXPECT_EQ(int(r.at(time_of(i)).state), int(status_t::STATE_LOST)) << i;
+    EXPECT_EQ(static_cast<int>(r.at(time_of(i)).state), static_cast<int>(status_t::STATE_LOST)) << i;
   }
   expect_back(r, 40, 2);
 }

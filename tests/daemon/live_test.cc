@@ -46,7 +46,7 @@ class FilmCamera final : public drivers::Camera {
     const double now_s = steady_s();
     if (began_s_ < 0.0) began_s_ = now_s;
     streaming_ = now_s - began_s_ < away_from_s_ || now_s - began_s_ >= away_to_s_;
-    const double due_s = began_s_ + double(shown_) / kRate_hz;
+    const double due_s = began_s_ + static_cast<double>(shown_) / kRate_hz;
     const double wait_s = streaming_ ? due_s - now_s : 1e-3 * timeout_ms;
     std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(wait_s, 0.0, 1e-3 * timeout_ms)));
     if (!streaming_ || wait_s > 1e-3 * timeout_ms) return false;
@@ -207,8 +207,8 @@ TEST_F(Live, ACameraThatIsAwayIsPublishedAtOnceAndAtTheStatusRate) {
     EXPECT_EQ(f.result.quality, -1);
   }
   // Told as soon as the driver knew, not after the time-out.
-  const double first_s = 1e-6 * double(silent_[0].result.utime);
-  const double second_s = 1e-6 * double(silent_[1].result.utime);
+  const double first_s = 1e-6 * static_cast<double>(silent_[0].result.utime);
+  const double second_s = 1e-6 * static_cast<double>(silent_[1].result.utime);
   EXPECT_NEAR(second_s - first_s, 0.2, 0.1);
   // And it went on with the images.
   EXPECT_GT(last_seen_.result.utime, silent_.back().result.utime);

@@ -84,8 +84,8 @@ TEST(Messages, ValidFrame) {
   EXPECT_EQ(o.velocity[1], 11.0);
   EXPECT_EQ(o.angular_velocity[2], 0.6);
   EXPECT_EQ(o.pose_covariance[0][5], 0.01);
-  EXPECT_EQ(o.state, int(status_t::STATE_TRACKING));
-  EXPECT_EQ(o.scale_state, int(status_t::SCALE_UNKNOWN));
+  EXPECT_EQ(o.state, static_cast<int>(status_t::STATE_TRACKING));
+  EXPECT_EQ(o.scale_state, static_cast<int>(status_t::SCALE_UNKNOWN));
   EXPECT_EQ(o.quality, 80);
   EXPECT_EQ(o.valid, 1);
   EXPECT_EQ(o.map_id, 2);
@@ -114,7 +114,7 @@ TEST(Messages, LossLeavesNoNumberThatCouldBeTakenForAPose) {
   EXPECT_EQ(o.valid, 0);
   EXPECT_EQ(o.velocity_valid, 0);
   EXPECT_EQ(p.valid, 0);
-  EXPECT_EQ(o.state, int(status_t::STATE_LOST));
+  EXPECT_EQ(o.state, static_cast<int>(status_t::STATE_LOST));
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(std::isnan(o.position[i]) && std::isnan(p.position[i]) && std::isnan(o.velocity[i]) &&
                 std::isnan(o.angular_velocity[i]));
@@ -124,17 +124,17 @@ TEST(Messages, LossLeavesNoNumberThatCouldBeTakenForAPose) {
 }
 
 TEST(Messages, StatesAndScalesHaveTheSameNumbersAsTheEstimators) {
-  EXPECT_EQ(int(status_t::STATE_STARTING), int(slam::State::kStarting));
-  EXPECT_EQ(int(status_t::STATE_INITIALISING), int(slam::State::kInitialising));
-  EXPECT_EQ(int(status_t::STATE_SETTLING), int(slam::State::kSettling));
-  EXPECT_EQ(int(status_t::STATE_TRACKING), int(slam::State::kTracking));
-  EXPECT_EQ(int(status_t::STATE_DEGRADED), int(slam::State::kDegraded));
-  EXPECT_EQ(int(status_t::STATE_LOST), int(slam::State::kLost));
-  EXPECT_EQ(int(status_t::STATE_RELOCALISING), int(slam::State::kRelocalising));
-  EXPECT_EQ(int(status_t::STATE_NO_CAMERA), int(slam::State::kNoCamera));
-  EXPECT_EQ(int(status_t::SCALE_UNKNOWN), int(slam::ScaleState::kUnknown));
-  EXPECT_EQ(int(status_t::SCALE_ASSUMED), int(slam::ScaleState::kAssumed));
-  EXPECT_EQ(int(status_t::SCALE_METRIC), int(slam::ScaleState::kMetric));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_STARTING), static_cast<int>(slam::State::kStarting));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_INITIALISING), static_cast<int>(slam::State::kInitialising));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_SETTLING), static_cast<int>(slam::State::kSettling));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_TRACKING), static_cast<int>(slam::State::kTracking));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_DEGRADED), static_cast<int>(slam::State::kDegraded));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_LOST), static_cast<int>(slam::State::kLost));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_RELOCALISING), static_cast<int>(slam::State::kRelocalising));
+  EXPECT_EQ(static_cast<int>(status_t::STATE_NO_CAMERA), static_cast<int>(slam::State::kNoCamera));
+  EXPECT_EQ(static_cast<int>(status_t::SCALE_UNKNOWN), static_cast<int>(slam::ScaleState::kUnknown));
+  EXPECT_EQ(static_cast<int>(status_t::SCALE_ASSUMED), static_cast<int>(slam::ScaleState::kAssumed));
+  EXPECT_EQ(static_cast<int>(status_t::SCALE_METRIC), static_cast<int>(slam::ScaleState::kMetric));
 }
 
 slam::LandmarkInfo landmark(std::int32_t map_id, double depth, double relative_sigma, bool full, bool vmp) {
@@ -160,7 +160,7 @@ TEST(Messages, MapHoldsTheFramesMapThinnedAndScaled) {
   ASSERT_EQ(all.npoints, 10);
   EXPECT_FLOAT_EQ(all.x[4], 10.0f);
   EXPECT_FLOAT_EQ(all.relative_sigma[4], 0.1f);
-  EXPECT_EQ(all.landmark_state[1], int(map_t::LANDMARK_FULL));
+  EXPECT_EQ(all.landmark_state[1], static_cast<int>(map_t::LANDMARK_FULL));
   ASSERT_EQ(all.nkeyframes, 1);
   EXPECT_EQ(all.keyframe_pose[0], (std::vector<double>{2.0, 4.0, 6.0, 1.0, 0.0, 0.0, 0.0}));
   const map_t thinned = make_map(f, content, 4, 2.0);

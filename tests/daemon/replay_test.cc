@@ -215,7 +215,7 @@ TEST_F(SyntheticRun, WritesEverythingThatIsAskedFor) {
   EXPECT_EQ(messages_of<map_from_odom_t>(path("out.lcm"), "FARPOINT_MAP_FROM_ODOM").size(), 60u);
   std::size_t valid = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    EXPECT_EQ(poses[i].utime, 1'000'000 + 100'000 * std::int64_t(i));
+    EXPECT_EQ(poses[i].utime, 1'000'000 + 100'000 * static_cast<std::int64_t>(i));
     EXPECT_EQ(odometry[i].utime, poses[i].utime);
     EXPECT_EQ(poses[i].valid != 0, poses[i].state == 3 || poses[i].state == 4);
     EXPECT_EQ(poses[i].scale_state, 0);
@@ -235,7 +235,7 @@ TEST_F(SyntheticRun, WritesEverythingThatIsAskedFor) {
     ASSERT_TRUE(std::getline(live, line));
     double t, x, y, z, qx, qy, qz, qw;
     std::istringstream(line) >> t >> x >> y >> z >> qx >> qy >> qz >> qw;
-    EXPECT_NEAR(t, 1e-6 * double(pose.utime), 1e-7);
+    EXPECT_NEAR(t, 1e-6 * static_cast<double>(pose.utime), 1e-7);
     EXPECT_NEAR(x, pose.position[0], 1e-9);
     EXPECT_NEAR(z, pose.position[2], 1e-9);
     EXPECT_NEAR(qw, pose.orientation[0], 1e-9);
@@ -252,7 +252,7 @@ TEST_F(SyntheticRun, WritesEverythingThatIsAskedFor) {
   const auto summary = messages_of<summary_t>(path("out.lcm"), "FARPOINT_SUMMARY");
   ASSERT_EQ(summary.size(), 1u);
   EXPECT_EQ(summary[0].frames, 60);
-  EXPECT_EQ(std::size_t(summary[0].frames_valid), valid);
+  EXPECT_EQ(static_cast<std::size_t>(summary[0].frames_valid), valid);
   EXPECT_GE(summary[0].nmaps, 1);
   EXPECT_GT(summary[0].maps[0].creation_depth_median, 0.0);
 

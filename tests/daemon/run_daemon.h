@@ -25,6 +25,7 @@ inline Outcome run_daemon(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "farpointd");
   arguments.insert(arguments.end(), {"--set", "log.level=warning"});
   std::vector<const char*> argv;
+  argv.reserve(arguments.size());
   for (const std::string& a : arguments) argv.push_back(a.c_str());
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();

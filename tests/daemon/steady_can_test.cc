@@ -67,9 +67,9 @@ TEST_F(SteadyCan, BetweenTwoImagesAtTheRateWithGrowingAgeAndSigma) {
   ASSERT_GE(sent.size(), 5U);  // the image's own, and after 20, 40, 60, 80 ms
   ASSERT_LE(sent.size(), 6U);
   for (std::size_t i = 1; i < sent.size(); ++i) {
-    EXPECT_NEAR(sent[i].at("FARPOINT_STATUS.Age"), 0.010 + 0.020 * double(i), 0.003) << i;
-    EXPECT_NEAR(sent[i].at("FARPOINT_POSITION_XY.PositionX"), 0.2 * double(i), 0.04) << i;
-    EXPECT_EQ(sent[i].at("FARPOINT_STATUS.Counter"), double(i));
+    EXPECT_NEAR(sent[i].at("FARPOINT_STATUS.Age"), 0.010 + 0.020 * static_cast<double>(i), 0.003) << i;
+    EXPECT_NEAR(sent[i].at("FARPOINT_POSITION_XY.PositionX"), 0.2 * static_cast<double>(i), 0.04) << i;
+    EXPECT_EQ(sent[i].at("FARPOINT_STATUS.Counter"), static_cast<double>(i));
   }
   EXPECT_GT(sent.back().at("FARPOINT_POSITION_SIGMA.SigmaPositionX"),
             sent.front().at("FARPOINT_POSITION_SIGMA.SigmaPositionX"));

@@ -51,10 +51,10 @@ void paint(const Square& s, double x_m, double z_m, std::vector<float>* image) {
   const double u = kFocal_px * (s.x_m - x_m) / depth_m + 0.5 * kWidth_px;
   const double v = kFocal_px * s.y_m / depth_m + 0.5 * kHeight_px;
   const double half_px = kFocal_px * s.half_m / depth_m;
-  const int left = std::max(0, int(std::floor(u - half_px))),
-            right = std::min(kWidth_px - 1, int(std::ceil(u + half_px)));
-  const int top = std::max(0, int(std::floor(v - half_px))),
-            bottom = std::min(kHeight_px - 1, int(std::ceil(v + half_px)));
+  const int left = std::max(0, static_cast<int>(std::floor(u - half_px))),
+            right = std::min(kWidth_px - 1, static_cast<int>(std::ceil(u + half_px)));
+  const int top = std::max(0, static_cast<int>(std::floor(v - half_px))),
+            bottom = std::min(kHeight_px - 1, static_cast<int>(std::ceil(v + half_px)));
   for (int y = top; y <= bottom; ++y) {
     for (int x = left; x <= right; ++x) {
       float sum = 0.0f;
@@ -64,11 +64,13 @@ void paint(const Square& s, double x_m, double z_m, std::vector<float>* image) {
                      py = y - 0.5 + (i / kSamples + 0.5) / kSamples;
         const double a = (px - u + half_px) / (2.0 * half_px), b = (py - v + half_px) / (2.0 * half_px);
         if (a < 0.0 || a >= 1.0 || b < 0.0 || b >= 1.0) continue;
-        sum += float(s.grey[static_cast<std::size_t>(int(b * kCells) * kCells + int(a * kCells))]);
+        sum += static_cast<float>(s.grey[static_cast<std::size_t>(static_cast<int>(b * kCells) * kCells +
+                                                                  static_cast<int>(a * kCells))]);
         ++inside;
       }
       float& pixel = (*image)[static_cast<std::size_t>(y * kWidth_px + x)];
-      pixel = (sum + pixel * float(kSamples * kSamples - inside)) / float(kSamples * kSamples);
+      pixel = (sum + pixel * static_cast<float>(kSamples * kSamples - inside)) /
+              static_cast<float>(kSamples * kSamples);
     }
   }
 }

@@ -91,7 +91,7 @@ int FakeV4l2System::ioctl(int, unsigned long request, void* argument) {
       return set_format(static_cast<v4l2_format*>(argument));
     case VIDIOC_S_PARM: {
       const v4l2_fract& t = static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe;
-      camera_->set_rate_hz = double(t.denominator) / double(t.numerator);
+      camera_->set_rate_hz = static_cast<double>(t.denominator) / static_cast<double>(t.numerator);
       return 0;
     }
     case VIDIOC_REQBUFS:
@@ -139,7 +139,8 @@ int FakeV4l2System::list_size(v4l2_frmsizeenum* entry) {
 
 int FakeV4l2System::list_interval(v4l2_frmivalenum* entry) {
   for (const FakeFormat& f : camera_->formats) {
-    if (f.code != entry->pixel_format || f.width != int(entry->width) || entry->index > 0) continue;
+    if (f.code != entry->pixel_format || f.width != static_cast<int>(entry->width) || entry->index > 0)
+      continue;
     entry->type = V4L2_FRMIVAL_TYPE_DISCRETE;
     entry->discrete = {1000, static_cast<std::uint32_t>(std::lround(1000 * f.fastest_hz))};
     return 0;
@@ -150,7 +151,7 @@ int FakeV4l2System::list_interval(v4l2_frmivalenum* entry) {
 int FakeV4l2System::set_format(v4l2_format* format) {
   v4l2_pix_format& pix = format->fmt.pix;
   for (const FakeFormat& f : camera_->formats) {
-    if (f.code != pix.pixelformat || f.width != int(pix.width)) continue;
+    if (f.code != pix.pixelformat || f.width != static_cast<int>(pix.width)) continue;
     if (camera_->takes_other_size) pix.width -= 4;
     pix.bytesperline = pix.width * static_cast<std::uint32_t>(bytes_a_pixel(f.code)) +
                        static_cast<std::uint32_t>(f.stride_padding);

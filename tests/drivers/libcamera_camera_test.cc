@@ -317,7 +317,7 @@ TEST_F(LibcameraCameraTest, AStampOfNoClockGivesTheTimeOfArrivalAndIsCounted) {
   shot.stamp_us = 0;
   ASSERT_TRUE(fake_->show(shot));
   ASSERT_TRUE(next());
-  EXPECT_NEAR(double(frame_.utime), double(fake_->now.monotonic_us), 2000.0);
+  EXPECT_NEAR(static_cast<double>(frame_.utime), static_cast<double>(fake_->now.monotonic_us), 2000.0);
   EXPECT_EQ(camera_->counts().times_unknown, 1);
 }
 

@@ -131,7 +131,8 @@ TEST_F(V4l2CameraTest, ImagesComeOnceInOrderWithTheirContent) {
     ASSERT_TRUE(next());
     EXPECT_EQ(frame_.sequence, i);
     EXPECT_EQ(image_.width_px, 64);
-    EXPECT_TRUE(std::all_of(image_.pixels.begin(), image_.pixels.end(), [i](int p) { return p == int(i); }));
+    EXPECT_TRUE(std::all_of(image_.pixels.begin(), image_.pixels.end(),
+                            [i](int p) { return p == static_cast<int>(i); }));
     EXPECT_EQ(fake_->buffers_queued(), options_.buffers);  // given back at once
   }
   EXPECT_EQ(camera_->counts().frames, 20);
@@ -276,7 +277,7 @@ TEST_F(V4l2CameraTest, ASystemTimeThatJumpsMovesNoImage) {
     show(i);
     ASSERT_TRUE(next());
     if (i > 0) {
-      EXPECT_NEAR(double(frame_.utime - last), 33'000.0, 2000.0);
+      EXPECT_NEAR(static_cast<double>(frame_.utime - last), 33'000.0, 2000.0);
     }
     last = frame_.utime;
     fake_->now.monotonic_us += 32'000;
@@ -290,7 +291,7 @@ TEST_F(V4l2CameraTest, AStampOfNoClockGivesTheTimeOfArrivalAndIsCounted) {
   show(0);
   fake_->frames[0].stamp_us = 42;
   ASSERT_TRUE(next());
-  EXPECT_NEAR(double(frame_.utime), double(fake_->now.monotonic_us), 2000.0);
+  EXPECT_NEAR(static_cast<double>(frame_.utime), static_cast<double>(fake_->now.monotonic_us), 2000.0);
   EXPECT_EQ(camera_->counts().times_unknown, 1);
 }
 

@@ -46,7 +46,8 @@ Bytes to_jpeg(const Bytes& pixels, int width_px, int height_px, int channels, bo
   if (progressive) jpeg_simple_progression(&jpeg);
   jpeg_start_compress(&jpeg, TRUE);
   while (jpeg.next_scanline < jpeg.image_height) {
-    JSAMPROW row = const_cast<JSAMPROW>(pixels.data() + jpeg.next_scanline * unsigned(width_px * channels));
+    JSAMPROW row =
+        const_cast<JSAMPROW>(pixels.data() + jpeg.next_scanline * static_cast<unsigned>(width_px * channels));
     jpeg_write_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_compress(&jpeg);
@@ -73,7 +74,7 @@ Bytes to_png(const Bytes& pixels, int width_px, int height_px, int type, int dep
   const std::size_t row_bytes = png_get_rowbytes(png, info);
   std::vector<png_bytep> rows;
   for (int v = 0; v < height_px; ++v) {
-    rows.push_back(const_cast<png_bytep>(pixels.data()) + std::size_t(v) * row_bytes);
+    rows.push_back(const_cast<png_bytep>(pixels.data()) + static_cast<std::size_t>(v) * row_bytes);
   }
   png_write_image(png, rows.data());
   png_write_end(png, nullptr);

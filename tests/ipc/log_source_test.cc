@@ -39,7 +39,7 @@ image_t make_image(std::int64_t utime, int camera = 0) {
   out.size = kWidth_px * kHeight_px;
   out.data.resize(static_cast<std::size_t>(out.size));
   for (std::size_t i = 0; i < out.data.size(); ++i)
-    out.data[i] = static_cast<std::uint8_t>(utime + std::int64_t(i));
+    out.data[i] = static_cast<std::uint8_t>(utime + static_cast<std::int64_t>(i));
   return out;
 }
 

@@ -145,7 +145,7 @@ std::string canonical(std::string_view layout) {
     if (std::isdigit(layout[i])) {
       std::size_t value = 0;
       for (; i < layout.size() && std::isdigit(layout[i]); ++i)
-        value = 10 * value + std::size_t(layout[i] - '0');
+        value = 10 * value + static_cast<std::size_t>(layout[i] - '0');
       --i;
       out.bytes(value);
     } else if (layout[i] == '[') {
@@ -169,7 +169,8 @@ void random_content(std::string_view layout, std::mt19937_64& rng, Bytes* out) {
   for (std::size_t i = 0; i < layout.size(); ++i) {
     if (std::isdigit(layout[i])) {
       std::size_t n = 0;
-      for (; i < layout.size() && std::isdigit(layout[i]); ++i) n = 10 * n + std::size_t(layout[i] - '0');
+      for (; i < layout.size() && std::isdigit(layout[i]); ++i)
+        n = 10 * n + static_cast<std::size_t>(layout[i] - '0');
       --i;
       for (std::size_t k = 0; k < n; ++k) out->push_back(static_cast<std::uint8_t>(rng()));
     } else if (layout[i] == 's') {
@@ -189,7 +190,7 @@ void random_content(std::string_view layout, std::mt19937_64& rng, Bytes* out) {
         ++end;
       }
       const std::string_view content = layout.substr(i + 3, end - i - 3);
-      const std::uint32_t count = counts.at(std::size_t(layout[i + 1] - '0'));
+      const std::uint32_t count = counts.at(static_cast<std::size_t>(layout[i + 1] - '0'));
       for (std::uint32_t k = 0; k < count; ++k) random_content(content, rng, out);
       i = end;
     }

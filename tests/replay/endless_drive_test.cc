@@ -67,10 +67,13 @@ TEST(RecordedEndlessLong, MemoryAndTimeStayAsTheyAre) {
   ASSERT_EQ(timings.size(), kFrames);
   for (std::size_t i = 499; i < kFrames; i += 500)
     std::printf("%5zu frames: %.1f MB, tracking p99 %.2f ms\n", i + 1,
-                1e-6 * double(timings[i].resident_bytes), tracking_p99_ms(timings, i - 499, i + 1));
+                1e-6 * static_cast<double>(timings[i].resident_bytes),
+                tracking_p99_ms(timings, i - 499, i + 1));
   // The map forgets from about a thousand frames on.
-  EXPECT_LT(double(timings.back().resident_bytes), 1.02 * double(timings[kFrames / 2].resident_bytes));
-  EXPECT_LE(double(timings.back().peak_resident_bytes), 200e6);
+  constexpr std::size_t kHalf = kFrames / 2;
+  EXPECT_LT(static_cast<double>(timings.back().resident_bytes),
+            1.02 * static_cast<double>(timings[kHalf].resident_bytes));
+  EXPECT_LE(static_cast<double>(timings.back().peak_resident_bytes), 200e6);
   const double before_ms = tracking_p99_ms(timings, 500, 1000);
   EXPECT_LT(tracking_p99_ms(timings, kFrames - 500, kFrames), 1.25 * before_ms);
 }

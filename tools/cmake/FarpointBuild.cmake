@@ -50,5 +50,6 @@ function(farpoint_test name folder)
   target_compile_definitions(${name} PRIVATE FARPOINT_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
                              FARPOINT_BINARY_DIR="${CMAKE_BINARY_DIR}")
   target_link_libraries(${name} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${folder} TIMEOUT 600)
+  # Printed values hold addresses, which would give a test another name in every build.
+  gtest_discover_tests(${name} NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${folder} TIMEOUT 600)
 endfunction()

@@ -28,7 +28,7 @@ volatile std::sig_atomic_t interrupted = 0;
 double steady_s() {
   timespec t{};
   clock_gettime(CLOCK_MONOTONIC, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 template <typename Message>

@@ -141,13 +141,15 @@ std::vector<Eigen::Vector2d> over_time(const RunRecord& run, const std::vector<M
 std::string memory_view(const Runs& runs) {
   Plot plot({"Memory", {"time since the first frame, s"}, {"MB", false, 0.0}, false, 520, 300});
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const auto resident = over_time(runs[i], runs[i].timings,
-                                    [](const timing_t& t) { return 1e-6 * double(t.resident_bytes); });
+    const auto resident = over_time(runs[i], runs[i].timings, [](const timing_t& t) {
+      return 1e-6 * static_cast<double>(t.resident_bytes);
+    });
     if (!resident.empty()) plot.line(runs[i].name + ", resident", resident, run_style(i));
     Style thin = run_style(i);
     thin.width_px = 0.9;
-    const auto pools = over_time(runs[i], runs[i].statuses,
-                                 [](const status_t& s) { return 1e-6 * double(s.memory_pool_bytes); });
+    const auto pools = over_time(runs[i], runs[i].statuses, [](const status_t& s) {
+      return 1e-6 * static_cast<double>(s.memory_pool_bytes);
+    });
     if (!pools.empty()) plot.line(runs[i].name + ", pools", pools, thin);
   }
   return plot.svg();

@@ -56,7 +56,8 @@ std::vector<Figure> figures() {
   const auto stage = [](int index) { return [index](const RunRecord& run) { return stage_ms(run, index); }; };
   const auto frame = [](auto member) {
     return [member](const RunRecord& run) {
-      return median_of_frames(run, [member](const PublishedFrame& f) { return double(f.*member); });
+      return median_of_frames(run,
+                              [member](const PublishedFrame& f) { return static_cast<double>(f.*member); });
     };
   };
   return {{"features a frame", frame(&PublishedFrame::features)},
@@ -69,7 +70,8 @@ std::vector<Figure> figures() {
            }},
           {"keyframes that see a point",
            [](const RunRecord& run) {
-             return median_of_landmarks(run, [](const landmark_t& l) { return double(l.nsightings); });
+             return median_of_landmarks(
+                 run, [](const landmark_t& l) { return static_cast<double>(l.nsightings); });
            }},
           {"time from a point's first to its last keyframe, s",
            [](const RunRecord& run) {

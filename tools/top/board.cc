@@ -37,7 +37,7 @@ double rate_hz(const std::deque<double>& times_s, double now_s, double window_s)
   const auto first = std::lower_bound(times_s.begin(), times_s.end(), now_s - window_s);
   const auto count = std::distance(first, times_s.end());
   if (count < 2) return 0.0;
-  return double(count - 1) / (times_s.back() - *first);
+  return static_cast<double>(count - 1) / (times_s.back() - *first);
 }
 
 // p50, p99, maximum, of values that are not negative.
@@ -46,7 +46,9 @@ std::string spread(std::vector<double> values) {
                values.end());
   if (values.empty()) return "-";
   std::sort(values.begin(), values.end());
-  const auto at = [&](double q) { return values[static_cast<std::size_t>(q * double(values.size() - 1))]; };
+  const auto at = [&](double q) {
+    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+  };
   return fmt::format("p50 {:.1f}  p99 {:.1f}  max {:.1f} ms", at(0.5), at(0.99), values.back());
 }
 
@@ -58,12 +60,13 @@ const char* scale_text(int scale) {
 }  // namespace
 
 const char* state_name(int state) {
-  return state >= 0 && state <= int(slam::State::kNoCamera) ? slam::to_string(slam::State(state)) : "?";
+  return state >= 0 && state <= static_cast<int>(slam::State::kNoCamera) ? slam::to_string(slam::State(state))
+                                                                         : "?";
 }
 
 const char* can_state_name(int state) {
   constexpr std::array names = {"unknown", "active", "warning", "error passive", "bus off", "down", "absent"};
-  return state >= 0 && state < int(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
+  return state >= 0 && state < static_cast<int>(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
 }
 
 void Board::take(const odometry_t& message, double now_s) {
@@ -153,9 +156,9 @@ std::string Board::count_lines() const {
                       s.log_write_errors, s.times_backwards);
   if (timing_) {
     text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
-                        double(timing_->resident_bytes) / kMegabyte,
-                        double(timing_->peak_resident_bytes) / kMegabyte,
-                        double(s.memory_pool_bytes) / kMegabyte);
+                        static_cast<double>(timing_->resident_bytes) / kMegabyte,
+                        static_cast<double>(timing_->peak_resident_bytes) / kMegabyte,
+                        static_cast<double>(s.memory_pool_bytes) / kMegabyte);
   }
   return text + fmt::format("\n{}   configuration {}   calibration {}\n", s.build, s.configuration_hash,
                             s.calibration_hash);
