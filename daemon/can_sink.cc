@@ -100,8 +100,10 @@ bool CanSink::tick(double now_s, wheels_t* wheels) {
   }
   if (last_s_ > 0.0 && steady_period_s_ > 0.0 && now_s >= next_steady_s_) send_carried_on(now_s);
   ipc::CanFrame frame;
-  while (bus_->receive(&frame)) {
-    const auto utime = static_cast<std::int64_t>(std::llround(1e6 * now_s));
+  std::int64_t age_us = 0;
+  while (bus_->receive(&frame, &age_us)) {
+    // Whoever looks only now and then must not make wheels younger than they are.
+    const auto utime = static_cast<std::int64_t>(std::llround(1e6 * now_s)) - age_us;
     if (wheels_ && wheels_->take(frame, utime, wheels)) return true;
   }
   return false;

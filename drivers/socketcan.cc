@@ -5,12 +5,14 @@
 #include <linux/can/raw.h>
 #include <net/if.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 
 namespace farpoint::drivers {
@@ -42,6 +44,43 @@ void set_filters(int fd, const std::vector<std::uint32_t>& wanted_ids) {
   const can_err_mask_t errors =
       CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_ACK | CAN_ERR_BUSERROR;
   (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
+}
+
+// The kernel notes when a frame arrived, by CLOCK_REALTIME.
+void ask_for_times(int fd) {
+  const int on = 1;
+  (void)setsockopt(fd, SOL_SOCKET, SO_TIMESTAMP, &on, sizeof on);
+}
+
+std::int64_t realtime_us() {
+  timespec t{};
+  clock_gettime(CLOCK_REALTIME, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000 + t.tv_nsec / 1000;
+}
+
+// 0 where the system's time was set since it arrived.
+std::int64_t age_us_of(msghdr* message) {
+  constexpr std::int64_t kOldest_us = 1'000'000;
+  const cmsghdr* control = CMSG_FIRSTHDR(message);
+  if (control == nullptr || control->cmsg_level != SOL_SOCKET || control->cmsg_type != SCM_TIMESTAMP)
+    return 0;
+  timeval arrived{};
+  std::memcpy(&arrived, CMSG_DATA(control), sizeof arrived);
+  const std::int64_t age_us = realtime_us() - std::int64_t{arrived.tv_sec} * 1'000'000 - arrived.tv_usec;
+  return age_us < 0 || age_us > kOldest_us ? 0 : age_us;
+}
+
+bool take(int fd, can_frame* frame, std::int64_t* age_us) {
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timeval))> control{};
+  iovec data{frame, sizeof *frame};
+  msghdr message{};
+  message.msg_iov = &data;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  if (recvmsg(fd, &message, 0) != static_cast<ssize_t>(sizeof *frame)) return false;
+  *age_us = age_us_of(&message);
+  return true;
 }
 
 can_frame to_kernel(const ipc::CanFrame& frame) {
@@ -88,6 +127,11 @@ SocketCan::SocketCan(const std::string& interface, const CanOptions& options)
   fail(interface, absent ? "no such interface (see: ip link show type can)" : std::strerror(error));
 }
 
+SocketCan::SocketCan(int fd, const CanOptions& options)
+    : options_(options), fd_(fd), bound_(true), given_(true) {
+  ask_for_times(fd);
+}
+
 SocketCan::~SocketCan() {
   close_socket();
 }
@@ -96,6 +140,7 @@ int SocketCan::open_and_bind() {
   fd_ = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd_ < 0) return errno;
   set_filters(fd_, options_.wanted_ids);
+  ask_for_times(fd_);
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
@@ -159,9 +204,9 @@ bool SocketCan::send_one(const ipc::CanFrame& frame) {
   return true;
 }
 
-bool SocketCan::receive(ipc::CanFrame* frame) {
+bool SocketCan::receive(ipc::CanFrame* frame, std::int64_t* age_us) {
   can_frame in{};
-  while (bound_ && read(fd_, &in, sizeof in) == static_cast<ssize_t>(sizeof in)) {
+  while (bound_ && take(fd_, &in, age_us)) {
     if ((in.can_id & CAN_ERR_FLAG) != 0) {
       take_error_frame(in.can_id & CAN_ERR_MASK, in.data);
       continue;

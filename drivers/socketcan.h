@@ -44,7 +44,7 @@ class SocketCan {
   // waited for the interface.
   explicit SocketCan(const std::string& interface, const CanOptions& options = {});
   // A socket that is there already, for tests; it is not opened again.
-  SocketCan(int fd, const CanOptions& options) : options_(options), fd_(fd), bound_(true), given_(true) {}
+  SocketCan(int fd, const CanOptions& options);
   ~SocketCan();
   SocketCan(const SocketCan&) = delete;
   SocketCan& operator=(const SocketCan&) = delete;
@@ -52,9 +52,9 @@ class SocketCan {
   // Sends all frames in order. A frame that the kernel does not take at once is counted and given up: the
   // next epoch carries newer data. True where all were taken. No allocation.
   bool send(std::span<const ipc::CanFrame> frames);
-  // A frame that has arrived, or false where there is none. Error frames go into state() and counts(); remote
-  // and extended frames are passed over.
-  [[nodiscard]] bool receive(ipc::CanFrame* frame);
+  // A frame that has arrived, and how long ago, or false where there is none. Error frames go into state()
+  // and counts(); remote and extended frames are passed over. No allocation.
+  [[nodiscard]] bool receive(ipc::CanFrame* frame, std::int64_t* age_us);
   // Where the interface is away, looks for it; call about once a second. No allocation.
   void maintain();
 

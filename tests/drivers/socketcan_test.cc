@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 namespace farpoint::drivers {
 namespace {
@@ -55,7 +57,8 @@ class SocketCanPair : public testing::Test {
     f.data[1] = controller;
     ASSERT_EQ(write(bus_, &f, sizeof f), static_cast<ssize_t>(sizeof f));
     ipc::CanFrame frame;
-    EXPECT_FALSE(can_->receive(&frame));  // no data
+    std::int64_t age_us = 0;
+    EXPECT_FALSE(can_->receive(&frame, &age_us));  // no data
   }
 
   std::unique_ptr<SocketCan> can_;
@@ -76,10 +79,25 @@ TEST_F(SocketCanPair, FramesGoThroughBothWays) {
   got.can_id = 0x120 | CAN_EFF_FLAG;
   ASSERT_EQ(write(bus_, &got, sizeof got), static_cast<ssize_t>(sizeof got));
   ipc::CanFrame frame;
-  ASSERT_TRUE(can_->receive(&frame));
+  std::int64_t age_us = 0;
+  ASSERT_TRUE(can_->receive(&frame, &age_us));
   EXPECT_EQ(frame.id, 0x120U);
   EXPECT_EQ(frame.size, 4);
-  EXPECT_FALSE(can_->receive(&frame));  // extended: passed over
+  EXPECT_FALSE(can_->receive(&frame, &age_us));  // extended: passed over
+}
+
+TEST_F(SocketCanPair, AFrameHasTheTimeAtWhichItArrivedNotThatAtWhichItIsRead) {
+  can_frame out{};
+  out.can_id = 0x120;
+  ASSERT_EQ(write(bus_, &out, sizeof out), static_cast<ssize_t>(sizeof out));
+  const auto began = std::chrono::steady_clock::now();
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ipc::CanFrame frame;
+  std::int64_t age_us = 0;
+  ASSERT_TRUE(can_->receive(&frame, &age_us));
+  const auto waited = std::chrono::steady_clock::now() - began;
+  EXPECT_GE(age_us, 20'000);
+  EXPECT_LE(age_us, std::chrono::duration_cast<std::chrono::microseconds>(waited).count() + 1000);
 }
 
 TEST_F(SocketCanPair, TheControllersNewsBecomeItsState) {

@@ -6,6 +6,7 @@ machine is started. And every scenario can be read.
 """
 
 import pathlib
+import struct
 import sys
 import tempfile
 import types
@@ -83,6 +84,13 @@ class Bus(unittest.TestCase):
     def test_rate(self):
         self.assertRegex(self.complaint(rate_hz=60.0), "50.0 Hz.*expected 60 Hz")
 
+    def test_gap(self):
+        # Two of 100 epochs do not come, and the counter goes on as if they had never been due.
+        late = lambda epoch, frames: {} if epoch in (50, 51) else (  # noqa: E731
+            frames if epoch < 50 else {i: frame(i, (epoch - 2) % 15, 0.03 + 0.02 * (epoch % 5), True) for i in frames})
+        self.assertIsNone(self.complaint(late))
+        self.assertRegex(self.complaint(late, expectations=("valid", "steady")), "gap at most 60 ms, expected .* 40 ms")
+
     def test_age(self):
         late = lambda epoch, frames: {i: frame(i, epoch % 15, 0.05, epoch > 10) for i in frames}  # noqa: E731
         self.assertRegex(self.complaint(late), "the age is wrong")
@@ -133,10 +141,45 @@ class Images(unittest.TestCase):
         self.assertRegex(self.complaint(late), "image 4 of time 7430 is of no frame")
 
 
+class Wheels(unittest.TestCase):
+    def complaint(self, spoil=lambda events: events, late_us=2_000, count="10"):
+        events, bus = [], []
+        for number in range(10):
+            raw, time_us = [100 * number - 500 + wheel for wheel in range(4)], 6_000_000 + 50_000 * number
+            frames = ("123#" + struct.pack(">hh", *raw[:2]).hex(), "124#" + struct.pack("<hh", *raw[2:]).hex())
+            bus += [f"({1e-6 * time_us:.6f}) vcan0 {frame}\n" for frame in frames]
+            speeds = [0.01 / 3.6 * one for one in raw]
+            utime = time_us - CLOCKS_US[1] + CLOCKS_US[0] + late_us
+            head = lcm_log.WHEELS.pack(utime, sum(speeds) / 4, -1.0, 0.0, 0.0, 4)
+            events.append(("WHEELS", bytes(8) + head + struct.pack(">4d", *speeds)))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "bus.log").write_text("".join(bus))
+            (folder / "played").write_text(f"clock {CLOCKS_US[0]} {CLOCKS_US[1]}\n")
+            lcm_log.write(folder / "out.lcm", spoil(events))
+            return checks.wheels(folder, types.SimpleNamespace(), "out.lcm", "bus.log", count)[0]
+
+    def test_good(self):
+        self.assertIsNone(self.complaint())
+
+    def test_missing_or_too_many(self):
+        self.assertRegex(self.complaint(lambda e: e[:4] + e[5:]), "9 WHEELS of 10 pairs")
+        self.assertRegex(self.complaint(lambda e: e + e[-1:]), "11 WHEELS of 10 pairs")
+        self.assertRegex(self.complaint(count="11"), "10 WHEELS of 10 pairs on the bus, expected 11")
+
+    def test_other_speed_or_order(self):
+        other = lambda e: e[:4] + [("WHEELS", e[4][1][:-8] + struct.pack(">d", 1.0))] + e[5:]  # noqa: E731
+        self.assertRegex(self.complaint(other), "wheels 4: 1.0000 m/s, expected")
+        self.assertRegex(self.complaint(lambda e: [e[1], e[0], *e[2:]]), "wheels 0: .* m/s, expected")
+
+    def test_other_time(self):
+        self.assertRegex(self.complaint(late_us=30_000), "time off by 30.0 ms")
+
+
 class Scenarios(unittest.TestCase):
     def test_can_be_read(self):
         known = scenario.read_all(ROOT / "tools/hil/scenarios")
-        self.assertGreaterEqual(len(known), 5)
+        self.assertGreater(len(known), 5)
         for one in known:
             self.assertIn(one.form, ("short", "long"), one.name)
             self.assertIn("BROKEN", one.script, one.name)

@@ -2,6 +2,7 @@
 # Runs in the guest: the scenarios that share this machine, one after the other, each cleaned up after. What a scenario
 # leaves is in /hil/NAME: out, status, seconds, and what it puts there.
 export root=/hil
+mountpoint -q /tmp || mount -t tmpfs tmpfs /tmp
 for name in $(cat $root/names); do
   export left=$root/$name
   from=$(cut -d' ' -f1 /proc/uptime)
@@ -12,9 +13,14 @@ for name in $(cat $root/names); do
   echo "$(cut -d' ' -f1 /proc/uptime) $from" | awk '{printf "%.0f\n", $1 - $2}' > "$left/seconds"
 
   pkill -KILL -s $session
+  if command -v farpointd > /dev/null; then
+    systemctl stop farpointd
+    systemctl revert farpointd
+    dpkg -P farpoint
+  fi > /dev/null 2>&1
   ip link delete vcan0 2> /dev/null
   sleep 0.5
-  for module in v4l2loopback vivid sch_tbf vcan; do rmmod $module 2> /dev/null; done
+  for module in v4l2loopback vivid uvcvideo vhci-hcd sch_tbf vcan kvaser_pci; do rmmod $module 2> /dev/null; done
   rm -rf /tmp/*
 done
 exit 0

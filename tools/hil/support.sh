@@ -1,11 +1,12 @@
 # What scenarios share. $left is the folder that the host reads afterwards; what must be quick is in /tmp.
 daemon_log=/tmp/daemon.log
 control=/tmp/control
-cd "$root" && cp -t /tmp farpointd farpoint play frames.grey camera.yaml
+began=$(date +%s)
+cd "$root" && cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
 # The machine's time jumps while it waits for its disk: libraries and tools are read before anything is timed.
 /tmp/farpointd --version > /dev/null
 /tmp/farpoint --help > /dev/null
-cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/sbin/tc /usr/sbin/ip > /dev/null
+cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/bin/journalctl /usr/bin/systemctl /usr/sbin/tc /usr/sbin/ip > /dev/null
 
 bring_back() { cp -t "$left" /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
 trap bring_back EXIT
@@ -15,6 +16,7 @@ fail() {
   echo "$*" > /tmp/complaint
   echo "complaint: $*"
   tail -20 $daemon_log 2> /dev/null
+  journalctl -u farpointd --since "@$began" -o short-monotonic --no-pager 2> /dev/null | tail -40
   exit 1
 }
 
@@ -94,10 +96,34 @@ stop_daemon() {
 
 loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
 
-# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
+# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`, and is silent after `hold`.
 start_playing() {
   rm -f /tmp/go
   /tmp/play /dev/video10 320x240 10 "$1" /tmp/go /tmp/frames.grey ${2:+"$2"} > /tmp/played &
   player=$!
 }
 go() { touch /tmp/go; }
+hold() { rm /tmp/go; }
+
+# --- the installed package, in a machine that systemd runs
+
+main_pid() { systemctl show -p MainPID --value farpointd; }
+# has_other_pid PID: the service runs, as another process.
+has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemctl -q is-active farpointd; }
+journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
+# service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
+service_tracks() {
+  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] &&
+    [ "${BASH_REMATCH[1]}" -ge 5 ]
+}
+
+# The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.
+install_service() {
+  dpkg -i "$root/farpoint.deb" > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
+  write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control /dev/video10 /etc/farpoint/camera.yaml
+  install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
+  systemctl start systemd-networkd
+  wait_until 20 "LCM's route" sh -c 'ip route | grep -q 224.0.0.0/4'
+  loopback
+  udevadm settle
+}

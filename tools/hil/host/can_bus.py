@@ -97,7 +97,7 @@ class Receiver:
         return None, found[1:-1]
 
     def check(self, path, stamps_us, clocks_us, rate_hz, expectations):
-        """Rate, counter, CRC and age; `expectations`: 'valid' (poses came), 'gap' (one interruption is allowed)."""
+        """Rate, counter, CRC and age; `expectations`: 'valid' (poses came), 'steady' (no gap)."""
         complaint, epochs = self.epochs(path)
         if complaint:
             return complaint, []
@@ -106,7 +106,7 @@ class Receiver:
         for step in (self._complete, self._counters):
             if complaint := step(epochs):
                 return complaint, []
-        complaint, rate = self._rate(epochs, rate_hz)
+        complaint, rate = self._rate(epochs, rate_hz, "steady" in expectations)
         if complaint:
             return complaint, []
         complaint, age = self._ages(epochs, stamps_us, clocks_us)
@@ -131,11 +131,15 @@ class Receiver:
         return None
 
     @staticmethod
-    def _rate(epochs, rate_hz):
+    def _rate(epochs, rate_hz, steady):
         found_hz = (len(epochs) - 1) / (epochs[-1].time_s - epochs[0].time_s)
         gaps = sorted(after.time_s - before.time_s for before, after in zip(epochs, epochs[1:]))
         text = f"{found_hz:.1f} Hz, gap at most {1e3 * gaps[-1]:.0f} ms"
-        return (None if found_hz >= 0.9 * rate_hz else f"{text}, expected {rate_hz:.0f} Hz"), text
+        if found_hz < 0.9 * rate_hz:
+            return f"{text}, expected {rate_hz:.0f} Hz", text
+        if steady and gaps[-1] > 2.0 / rate_hz:
+            return f"{text}, expected at most {2e3 / rate_hz:.0f} ms", text
+        return None, text
 
     def _ages(self, epochs, stamps_us, clocks_us):
         """The time of arrival less the age is the time of an image that was played."""

@@ -1,6 +1,7 @@
 """What the host checks of what a scenario left: each check gives (complaint or None, figures)."""
 
 import pathlib
+import struct
 
 from host import can_bus, lcm_log
 from host.material import NotMade, run as run_program
@@ -146,7 +147,38 @@ def bus(folder, stock, log, of, rate_hz, *expectations):
     return receiver.check(folder / log, [stamp for _, stamp in frames], clocks, float(rate_hz), expectations)
 
 
-CHECKS = {"images": images, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status}
+def axles(path):
+    """[(time in s, speeds of the four wheels in m/s)] of what a bus carried: how tools/hil/scenarios/wheels.sh lays it."""
+    front, found = (), []
+    for time_s, identifier, data in can_bus.frames_of(path):
+        if identifier == 0x123:
+            front = struct.unpack_from(">hh", data)
+        elif identifier == 0x124:
+            found.append((time_s, [0.01 / 3.6 * raw for raw in (*front, *struct.unpack_from("<hh", data))]))
+    return found
+
+
+def wheels(folder, stock, log, bus_log, count):
+    """Each pair of axle frames came out once, in order, with its speeds and within 10 ms of its time on the bus."""
+    del stock
+    (monotonic_us, real_us), _ = played(folder / "played")
+    sent, came = axles(folder / bus_log), list(lcm_log.wheels(folder / log))
+    if len(sent) != int(count) or len(came) != len(sent):
+        return f"{len(came)} WHEELS of {len(sent)} pairs on the bus, expected {count}", []
+    worst_s = 0.0
+    for number, ((time_s, speeds), (utime, speed, wheel_speeds)) in enumerate(zip(sent, came)):
+        for is_m_s, must_m_s in zip((*wheel_speeds, speed), (*speeds, sum(speeds) / 4)):
+            if abs(is_m_s - must_m_s) > 1e-9:
+                return f"wheels {number}: {is_m_s:.4f} m/s, expected {must_m_s:.4f}", []
+        worst_s = max(worst_s, abs(1e-6 * (utime - monotonic_us + real_us) - time_s))
+    if worst_s > 0.01:
+        return f"wheels: time off by {1e3 * worst_s:.1f} ms, expected at most 10", []
+    return None, [f"{len(came)} of {len(sent)} pairs of frames, {sent[0][1][0]:.2f} to {sent[-1][1][0]:.2f} m/s, "
+                  f"time off by at most {1e3 * worst_s:.1f} ms"]
+
+
+CHECKS = {"images": images, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
+          "wheels": wheels}
 
 
 def run(check, folder, stock):

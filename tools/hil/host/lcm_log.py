@@ -13,11 +13,14 @@ IMAGE = struct.Struct(">qqiifiiiii")
 CAMERA = struct.Struct(">ii4d5d3d4ddd")
 
 # status_t behind its fingerprint, as far as it is read here.
-STATUS = struct.Struct(">qbbdbii16q")
+STATUS = struct.Struct(">qbbdbii19qb")
 STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter",
                 "frames_received", "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped",
                 "images_wrong_size", "images_undecodable", "images_missing", "images_flagged", "camera_losses",
-                "images_unknown_camera", "times_backwards", "messages_undecodable", "log_damages", "imu_invalid", "can_receive_errors")
+                "images_unknown_camera", "times_backwards", "messages_undecodable", "log_damages", "imu_invalid",
+                "can_receive_errors", "can_send_errors", "can_bus_offs", "can_received", "can_state")
+# wheels_t behind its fingerprint, before the wheels: utime, speed, its sigma, yaw rate, steering angle, how many.
+WHEELS = struct.Struct(">qddddi")
 
 
 @dataclasses.dataclass
@@ -68,6 +71,15 @@ def last_status(path):
     """name -> value of the last FARPOINT_STATUS."""
     last = [data for channel, data in events(path) if channel == "FARPOINT_STATUS"][-1]
     return dict(zip(STATUS_NAMES, STATUS.unpack_from(last, FINGERPRINT_BYTES)))
+
+
+def wheels(path):
+    """(utime, speed of the vehicle, speeds of its wheels) of every WHEELS."""
+    for channel, data in events(path):
+        if channel != "WHEELS":
+            continue
+        utime, speed, _, _, _, count = WHEELS.unpack_from(data, FINGERPRINT_BYTES)
+        yield utime, speed, struct.unpack_from(f">{count}d", data, FINGERPRINT_BYTES + WHEELS.size)
 
 
 def with_image(data, utime, pixels):

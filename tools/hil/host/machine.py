@@ -9,6 +9,7 @@ from host import material
 # sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
 # first.
 VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
+SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
 
 def guest(here, packages):
@@ -19,8 +20,9 @@ def guest(here, packages):
     return pathlib.Path(done.stdout.strip())
 
 
-def command(guest_folder, devices, folder):
-    kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check"
+def command(guest_folder, kind, devices, folder):
+    kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
+    kernel_line += SYSTEMD if kind == "systemd" else ""
     return ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
             "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
             "-serial", "stdio", "-monitor", "none", "-no-reboot",
@@ -30,10 +32,10 @@ def command(guest_folder, devices, folder):
             "-device", "isa-debug-exit,iobase=0xf4,iosize=0x04", *devices.split()]
 
 
-def run(guest_folder, devices, folder, timeout_s):
+def run(guest_folder, kind, devices, folder, timeout_s):
     """Runs the scenarios that were laid into `folder`, to their end or to that of the time."""
     with open(folder / "console", "wb") as console:
-        machine = subprocess.Popen(command(guest_folder, devices, folder), stdin=subprocess.DEVNULL,
+        machine = subprocess.Popen(command(guest_folder, kind, devices, folder), stdin=subprocess.DEVNULL,
                                    stdout=console, stderr=console)
         try:
             machine.wait(timeout=timeout_s)

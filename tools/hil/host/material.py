@@ -1,4 +1,4 @@
-"""What scenarios are given: the programs under test, the bench's own, a simulated sequence."""
+"""What scenarios are given: the programs under test, the bench's own, a simulated sequence, the package."""
 
 import pathlib
 import shutil
@@ -67,6 +67,15 @@ class Stock:
         alternatives = text.strip().split("=", 1)[1].split(",")
         return [alternative.split("|")[0].split("(")[0].strip() for alternative in alternatives]
 
+    def package(self):
+        """The .deb, made where it is first asked for."""
+        made = list(self.folder.glob("package/*.deb"))
+        if not made:
+            run("cpack", "-G", "DEB", "-B", self.folder / "package", "--config", self.build / "CPackConfig.cmake",
+                cwd=self.build)
+            made = list(self.folder.glob("package/*.deb"))
+        return made[0]
+
     def lay_out(self, several, folder, broken):
         """What a machine is given that runs these scenarios; each has a folder of its own for what it leaves."""
         for program in PROGRAMS:
@@ -75,6 +84,8 @@ class Stock:
             if file.is_file():
                 shutil.copy(file, folder)
         shutil.copy(self.here / "run_scenarios.sh", folder / "scenario")
+        if any(one.needs == "package" for one in several):
+            shutil.copy(self.package(), folder / "farpoint.deb")
         support = (self.here / "support.sh").read_text()
         for one in several:
             (folder / one.name).mkdir()

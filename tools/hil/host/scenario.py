@@ -2,7 +2,9 @@
 
     # What is proved, in one line.
     #@ form: short                    or long
+    #@ machine: systemd               else in a machine without it
     #@ devices: -device ...           further devices of the machine
+    #@ needs: package                 the .deb is laid beside it
     #@ check: NAME ARGUMENT...        of checks.py, on what it left; any number
     #@ broken: what is left out or inverted where $BROKEN is set
     #@ broken_says: the complaint that must follow, a regular expression
@@ -19,7 +21,9 @@ class Scenario:
     title: str
     script: str
     form: str = "short"
+    machine: str = "plain"
     devices: str = ""
+    needs: str = ""
     broken: str = ""
     broken_says: str = ""
     checks: list = dataclasses.field(default_factory=list)
@@ -37,7 +41,7 @@ def read(path):
         key, value = line[3:].split(": ", 1)
         if key == "check":
             one.checks.append(value.split())
-        elif key in ("form", "devices", "broken", "broken_says"):
+        elif key in ("form", "machine", "devices", "needs", "broken", "broken_says"):
             setattr(one, key, value)
         else:
             raise ValueError(f"{path}: unknown key '{key}'")

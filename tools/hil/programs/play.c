@@ -1,9 +1,10 @@
 // usage: play DEVICE WIDTHxHEIGHT RATE COUNT GO_FILE FRAMES_FILE [LEAVE_OUT]
 //
 // Plays raw grey frames to a video output device, RATE a second, each with the time at which it was due as
-// its stamp. Streams at once, but sends the first frame only when GO_FILE exists. The file is played forwards
-// and backwards in turn, so that the motion has no jump. Prints "clock MONOTONIC_US REALTIME_US", then
-// "NUMBER INDEX_IN_FILE STAMP_US" a frame. The frame LEAVE_OUT is printed and not sent.
+// its stamp. Streams at once, but sends the first frame only when GO_FILE exists, and falls silent while it
+// is away. The file is played forwards and backwards in turn, so that the motion has no jump. Prints "clock
+// MONOTONIC_US REALTIME_US", then "NUMBER INDEX_IN_FILE STAMP_US" a frame. The frame LEAVE_OUT is printed and
+// not sent.
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -28,6 +29,12 @@ static int64_t now_us(clockid_t clock) {
 static void sleep_until(int64_t due_us) {
   const struct timespec t = {due_us / 1000000, due_us % 1000000 * 1000};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) continue;
+}
+
+static int wait_for(const char* path) {
+  int waited = 0;
+  for (; access(path, F_OK) != 0; waited = 1) usleep(20000);
+  return waited;
 }
 
 static void check(int failed, const char* what) {
@@ -122,7 +129,7 @@ int main(int argc, char** argv) {
   map_buffers(fd, buffers);
   int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
   ask(fd, VIDIOC_STREAMON, &type, "VIDIOC_STREAMON");
-  while (access(argv[5], F_OK) != 0) usleep(20000);
+  wait_for(argv[5]);
 
   printf("clock %lld %lld\n", (long long)now_us(CLOCK_MONOTONIC), (long long)now_us(CLOCK_REALTIME));
   int64_t due_us = now_us(CLOCK_MONOTONIC) + period_us;
@@ -130,6 +137,7 @@ int main(int argc, char** argv) {
   for (long number = 0; number < count; ++number, due_us += period_us) {
     const long index = forwards_and_backwards(number, frames.count);
     sleep_until(due_us);
+    if (wait_for(argv[5])) due_us = now_us(CLOCK_MONOTONIC);
     if (number != left_out) send(fd, buffers, sent++, frames.bytes + (size_t)index * bytes, bytes, due_us);
     printf("%ld %ld %lld\n", number, index, (long long)due_us);
     fflush(stdout);

@@ -1,0 +1,34 @@
+# The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all but the last.
+#@ form: long
+#@ machine: systemd
+#@ needs: package
+#@ broken: the package of the upgrade does not restart the service
+#@ broken_says: ^restart by the upgrade: not within
+install_service
+start_playing 100000
+go
+systemctl start farpointd || fail "systemctl start failed"
+wait_until 30 "the service tracks frames" service_tracks
+pid=$(main_pid)
+
+dpkg-deb -R "$root/farpoint.deb" /tmp/next || fail "the package cannot be unpacked"
+sed -i 's/^Version: .*/&+next/' /tmp/next/DEBIAN/control
+[ -z "$BROKEN" ] || sed -i '/try-restart/d' /tmp/next/DEBIAN/postinst
+dpkg-deb -b -Znone /tmp/next /tmp/next.deb > /dev/null || fail "the next version cannot be made"
+dpkg -i --force-confdef --force-confold /tmp/next.deb > /tmp/dpkg.log 2>&1 || fail "upgrade: $(tail -1 /tmp/dpkg.log)"
+from=$(seconds)
+wait_until 10 "restart by the upgrade" has_other_pid "$pid"
+wait_until 30 "frames tracked after the upgrade" service_tracks
+figure "upgraded while running, tracks again after $(since "$from") s"
+grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the upgrade replaced the configuration"
+
+dpkg -r farpoint > /tmp/dpkg.log 2>&1 || fail "removal: $(tail -1 /tmp/dpkg.log)"
+! systemctl -q is-active farpointd || fail "the removal left the service running"
+! command -v farpointd || fail "the removal left the program"
+grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the removal took the configuration"
+[ -e /etc/farpoint/camera.yaml ] || fail "the removal took the camera file"
+dpkg -P farpoint > /tmp/dpkg.log 2>&1 || fail "purge: $(tail -1 /tmp/dpkg.log)"
+remains=$(ls -d /etc/farpoint /var/lib/farpoint /var/log/farpoint 2> /dev/null)
+[ -z "$remains" ] || fail "the purge left $remains"
+[ -z "$(systemctl --failed --no-legend | grep farpoint)" ] || fail "a failed unit is left"
+figure "removed with the configuration kept, purged with nothing left"
