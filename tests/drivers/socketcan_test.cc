@@ -47,7 +47,7 @@ class SocketCanPair : public testing::Test {
     can_ = std::make_unique<SocketCan>(ends[0], CanOptions{});
     bus_ = ends[1];
   }
-  ~SocketCanPair() override {
+  void TearDown() override {
     if (bus_ >= 0) close(bus_);
   }
   void error(std::uint32_t kinds, std::uint8_t controller = 0) {
