@@ -77,10 +77,7 @@ ConfigKey boolean(const char* name, Field field) {
 }
 
 // A function object that gives the named field, const or not like the configuration.
-#define FIELD(path)      \
-  [](auto& c) -> auto& { \
-    return c.path;       \
-  }
+#define FIELD(path) ([](auto& c) -> auto& { return c.path; })
 
 std::vector<ConfigKey> make_keys() {
   return {

@@ -20,7 +20,7 @@ class LibcameraExposure {
   [[nodiscard]] std::optional<int> gain() const { return gain_; }
 
  private:
-  [[nodiscard]] LibcameraSetting apply(const ExposureSetting& setting);
+  [[nodiscard]] LibcameraSetting apply(const ExposureSetting& wanted);
 
   LibcameraStream stream_;
   ExposureSetting applied_;

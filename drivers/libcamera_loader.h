@@ -13,7 +13,6 @@ namespace farpoint::drivers {
 
 // Before other threads are started and memory is locked. Null with *problem filled where there is no such
 // module, libcamera is not there, or they are not of one build. Once loaded it stays: libcamera has threads.
-[[nodiscard]] std::unique_ptr<LibcameraSystem> load_libcamera(const std::string& module,
-                                                              std::string* problem);
+[[nodiscard]] std::unique_ptr<LibcameraSystem> load_libcamera(const std::string& path, std::string* problem);
 
 }  // namespace farpoint::drivers

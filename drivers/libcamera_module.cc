@@ -259,13 +259,13 @@ int Libcamera::start(const LibcameraSetting& setting, const char** what) {
   return 0;
 }
 
-void Libcamera::read(std::uint32_t number, LibcameraFrame* frame) {
+void Libcamera::read(std::uint32_t request, LibcameraFrame* frame) {
   constexpr std::int64_t kNanosPerMicro = 1000;
   *frame = {};
-  lc::Request& request = *requests_.at(number);
-  const lc::FrameBuffer* buffer = request.findBuffer(stream_);
+  lc::Request& finished = *requests_.at(request);
+  const lc::FrameBuffer* buffer = finished.findBuffer(stream_);
   const lc::FrameMetadata& metadata = buffer->metadata();
-  const bool cancelled = request.status() != lc::Request::RequestComplete ||
+  const bool cancelled = finished.status() != lc::Request::RequestComplete ||
                          metadata.status == lc::FrameMetadata::FrameCancelled;
   if (cancelled) {
     frame->status = LibcameraFrame::Status::kCancelled;
@@ -273,8 +273,8 @@ void Libcamera::read(std::uint32_t number, LibcameraFrame* frame) {
   }
   if (metadata.status != lc::FrameMetadata::FrameSuccess) frame->status = LibcameraFrame::Status::kDamaged;
   frame->sequence = metadata.sequence;
-  frame->bytes = mappings_.at(number)->read(metadata.planes()[0].bytesused);
-  const lc::ControlList& reported = request.metadata();
+  frame->bytes = mappings_.at(request)->read(metadata.planes()[0].bytesused);
+  const lc::ControlList& reported = finished.metadata();
   const auto stamp_ns = reported.get(lc::controls::SensorTimestamp);
   frame->stamp_us = (stamp_ns ? *stamp_ns : static_cast<std::int64_t>(metadata.timestamp)) / kNanosPerMicro;
   if (const auto us = reported.get(lc::controls::ExposureTime)) frame->exposure_us = *us;
@@ -282,12 +282,12 @@ void Libcamera::read(std::uint32_t number, LibcameraFrame* frame) {
     frame->gain = static_cast<int>(std::lround(*gain / kLibcameraGainUnit));
 }
 
-int Libcamera::give_back(std::uint32_t number, const LibcameraSetting& setting) {
-  mappings_.at(number)->end_reading();
-  lc::Request& request = *requests_.at(number);
-  request.reuse(lc::Request::ReuseBuffers);
-  set_controls(setting, &request.controls());
-  return camera_->queueRequest(&request);
+int Libcamera::give_back(std::uint32_t request, const LibcameraSetting& setting) {
+  mappings_.at(request)->end_reading();
+  lc::Request& again = *requests_.at(request);
+  again.reuse(lc::Request::ReuseBuffers);
+  set_controls(setting, &again.controls());
+  return camera_->queueRequest(&again);
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ int FakeLibcameraSystem::configure(CameraFormat format, int width_px, int height
   stream->row_stride = camera_->row_stride;
   stream->requests = camera_->requests;
   const auto count = static_cast<std::size_t>(camera_->requests);
-  const auto bytes = static_cast<std::size_t>(camera_->row_stride * height_px);
+  const auto bytes = static_cast<std::size_t>(camera_->row_stride) * static_cast<std::size_t>(height_px);
   camera_->memory.assign(count, std::vector<std::uint8_t>(bytes));
   camera_->frames.assign(count, {});
   return 0;

@@ -32,8 +32,8 @@ Seen seen_by_own_thread() {
 // Leaves the process as it was.
 class ForeignThreads : public testing::Test {
  protected:
-  ForeignThreads() { pthread_getattr_default_np(&before_); }
-  ~ForeignThreads() override {
+  void SetUp() override { pthread_getattr_default_np(&before_); }
+  void TearDown() override {
     pthread_setattr_default_np(&before_);
     pthread_attr_destroy(&before_);
   }

@@ -15,7 +15,6 @@ namespace {
 using Kind = CameraEvent::Kind;
 using test::fake_frame;
 using test::FakeCamera;
-using test::FakeFormat;
 using test::FakeFrame;
 using test::jpeg_of;
 

@@ -22,9 +22,10 @@ struct SpyOptions {
 };
 
 // Becomes lcm-spy; returns only where that fails.
-[[noreturn]] void become(const std::vector<std::string>& command_line) {
+[[noreturn]] void become(std::vector<std::string> command_line) {
   std::vector<char*> arguments;
-  for (const std::string& argument : command_line) arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.reserve(command_line.size() + 1);
+  for (std::string& argument : command_line) arguments.push_back(argument.data());
   arguments.push_back(nullptr);
   execv(arguments.front(), arguments.data());
   throw RunError("spy: " + command_line.front() + " cannot be started: " + std::strerror(errno));
