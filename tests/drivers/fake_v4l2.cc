@@ -63,12 +63,11 @@ void FakeV4l2System::unmap(void*, std::size_t) {
   ++camera_->unmapped;
 }
 
-int FakeV4l2System::wait(int fd, int timeout_ms) {
+void FakeV4l2Wait::wait(int fd, int timeout_ms) {
   camera_->waits_ms.push_back(timeout_ms);
   const bool something =
       fd >= 0 && (!camera_->frames.empty() || camera_->stream_error != 0 || !camera_->plugged);
   advance(camera_.get(), something ? 1 : timeout_ms);
-  return something ? 1 : 0;
 }
 
 int FakeV4l2System::ioctl(int, unsigned long request, void* argument) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/camera_wait.h"
 #include "drivers/v4l2_system.h"
 
 namespace farpoint::test {
@@ -71,8 +72,6 @@ class FakeV4l2System final : public drivers::V4l2System {
   [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
-  int wait(int fd, int timeout_ms) override;
-  [[nodiscard]] drivers::ClockReadings clocks() override { return camera_->now; }
 
  private:
   int list_format(v4l2_fmtdesc* entry);
@@ -84,6 +83,17 @@ class FakeV4l2System final : public drivers::V4l2System {
   int control(unsigned long request, void* argument);
   [[nodiscard]] std::size_t buffer_bytes() const;
 
+  std::shared_ptr<FakeCamera> camera_;
+};
+
+// Time passes as it is waited for.
+class FakeV4l2Wait final : public drivers::CameraWait {
+ public:
+  explicit FakeV4l2Wait(std::shared_ptr<FakeCamera> camera) : camera_(std::move(camera)) {}
+  void wait(int fd, int timeout_ms) override;
+  [[nodiscard]] drivers::ClockReadings clocks() override { return camera_->now; }
+
+ private:
   std::shared_ptr<FakeCamera> camera_;
 };
 

@@ -1,10 +1,11 @@
-#include "drivers/v4l2_camera.h"
+#include "drivers/v4l2_device.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstring>
 
+#include "drivers/live_camera.h"
 #include "tests/drivers/fake_v4l2.h"
 #include "tests/drivers/jpeg_images.h"
 #include "tests/ipc/allocations.h"
@@ -31,7 +32,9 @@ class V4l2CameraTest : public testing::Test {
   }
 
   void make() {
-    camera_ = std::make_unique<V4l2Camera>(options_, std::make_unique<test::FakeV4l2System>(fake_));
+    camera_ = std::make_unique<LiveCamera>(
+        options_, std::make_unique<V4l2Device>(options_, std::make_unique<test::FakeV4l2System>(fake_)),
+        std::make_unique<test::FakeV4l2Wait>(fake_));
     camera_->on_event([this](const CameraEvent& event) { events_.push_back(event); });
   }
   bool next() { return camera_->next(kTimeout_ms, &image_, &frame_); }
@@ -57,7 +60,7 @@ class V4l2CameraTest : public testing::Test {
 
   std::shared_ptr<FakeCamera> fake_;
   CameraOptions options_;
-  std::unique_ptr<V4l2Camera> camera_;
+  std::unique_ptr<LiveCamera> camera_;
   std::vector<CameraEvent> events_;
   ipc::GreyImage image_;
   CameraFrame frame_;

@@ -1,4 +1,4 @@
-#include "drivers/libcamera_camera.h"
+#include "drivers/libcamera_device.h"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "drivers/libcamera_loader.h"
+#include "drivers/live_camera.h"
 #include "tests/drivers/fake_libcamera.h"
 #include "tests/drivers/jpeg_images.h"
 #include "tests/ipc/allocations.h"
@@ -35,11 +36,14 @@ class LibcameraCameraTest : public testing::Test {
     options_.exposure.mode = ExposureMode::kCamera;
   }
 
+  std::unique_ptr<LibcameraDevice> make_device() {
+    return std::make_unique<LibcameraDevice>(options_, std::make_unique<test::FakeLibcameraSystem>(fake_));
+  }
   void make() {
     camera_.reset();
     events_.clear();
-    camera_ = std::make_unique<LibcameraCamera>(options_, std::make_unique<test::FakeLibcameraSystem>(fake_),
-                                                std::make_unique<test::FakeCameraWait>(fake_));
+    camera_ =
+        std::make_unique<LiveCamera>(options_, make_device(), std::make_unique<test::FakeCameraWait>(fake_));
     camera_->on_event([this](const CameraEvent& event) { events_.push_back(event); });
   }
   bool next() { return camera_->next(kTimeout_ms, &image_, &frame_); }
@@ -72,7 +76,7 @@ class LibcameraCameraTest : public testing::Test {
 
   std::shared_ptr<FakeLibcamera> fake_ = std::make_shared<FakeLibcamera>();
   CameraOptions options_;
-  std::unique_ptr<LibcameraCamera> camera_;
+  std::unique_ptr<LiveCamera> camera_;
   std::vector<CameraEvent> events_;
   ipc::GreyImage image_;
   CameraFrame frame_;
@@ -136,9 +140,9 @@ TEST_F(LibcameraCameraTest, TheRateIsAskedForWhereItCanBe) {
 TEST_F(LibcameraCameraTest, OnlyNamesThatCanBeUsed) {
   for (const char* good :
        {"0", "12", "\\_SB_.PCI0.XHC_.RHUB.HS08-8:1.0-04f2:b681", "/base/soc/i2c@1/imx219@10"})
-    EXPECT_EQ(LibcameraCamera::check(good), "") << good;
+    EXPECT_EQ(LibcameraDevice::check(good), "") << good;
   for (const char* bad : {"", "/dev/video0", "by-id:cam", "usb:1-2"})
-    EXPECT_NE(LibcameraCamera::check(bad).find("expected its id"), std::string::npos) << bad;
+    EXPECT_NE(LibcameraDevice::check(bad).find("expected its id"), std::string::npos) << bad;
 }
 
 // ---- frames
@@ -493,7 +497,7 @@ TEST_F(LibcameraCameraTest, ExposureChangesWhileStreaming) {
 TEST_F(LibcameraCameraTest, AStopTakesLessThanASecondWhateverTheCameraDoes) {
   for (const bool removed : {false, true}) {
     fake_->plugged = true;
-    camera_ = std::make_unique<LibcameraCamera>(options_, std::make_unique<test::FakeLibcameraSystem>(fake_));
+    camera_ = std::make_unique<LiveCamera>(options_, make_device());
     ASSERT_FALSE(camera_->next(1, &image_, &frame_));
     ASSERT_TRUE(camera_->is_streaming());
     FinishedRequests* finished = fake_->finished;
