@@ -13,8 +13,8 @@
 #include "drivers/libcamera_loader.h"
 #include "drivers/live_camera.h"
 #include "tests/drivers/fake_libcamera.h"
-#include "tests/drivers/jpeg_images.h"
 #include "tests/ipc/allocations.h"
+#include "tests/ipc/jpeg_images.h"
 
 namespace farpoint::drivers {
 namespace {
@@ -199,7 +199,7 @@ TEST_F(LibcameraCameraTest, MjpegIsDecodedAndWhatIsNoneIsCounted) {
   fake_->formats = {CameraFormat::kMjpeg};
   start();
   FakeShot shot;
-  shot.bytes = test::jpeg_of(64, 48, 77);
+  shot.bytes = test::plain_jpeg(64, 48, 77);
   ASSERT_TRUE(fake_->show(shot));
   ASSERT_TRUE(next());
   EXPECT_NEAR(image_.pixels[1000], 77, 1);

@@ -7,8 +7,8 @@
 
 #include "drivers/live_camera.h"
 #include "tests/drivers/fake_v4l2.h"
-#include "tests/drivers/jpeg_images.h"
 #include "tests/ipc/allocations.h"
+#include "tests/ipc/jpeg_images.h"
 
 namespace farpoint::drivers {
 namespace {
@@ -17,7 +17,7 @@ using Kind = CameraEvent::Kind;
 using test::fake_frame;
 using test::FakeCamera;
 using test::FakeFrame;
-using test::jpeg_of;
+using test::plain_jpeg;
 
 constexpr int kTimeout_ms = 20;
 
@@ -196,11 +196,11 @@ TEST_F(V4l2CameraTest, MjpegIsDecoded) {
   fake_->formats = {{V4L2_PIX_FMT_MJPEG}};
   start();
   show(0);
-  fake_->frames[0].bytes = jpeg_of(64, 48, 77);
+  fake_->frames[0].bytes = plain_jpeg(64, 48, 77);
   ASSERT_TRUE(next());
   EXPECT_EQ(image_.pixels[1000], 77);
   show(1);
-  fake_->frames[0].bytes = jpeg_of(32, 48, 77);  // not the size that was agreed upon
+  fake_->frames[0].bytes = plain_jpeg(32, 48, 77);  // not the size that was agreed upon
   EXPECT_FALSE(next());
   EXPECT_EQ(camera_->counts().undecodable, 1);
 }
@@ -209,7 +209,7 @@ TEST_F(V4l2CameraTest, NoHeapCallAfterTheFirstImages) {
   if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
   fake_->formats = {{V4L2_PIX_FMT_MJPEG}};
   start();
-  const auto jpeg = jpeg_of(64, 48, 77);
+  const auto jpeg = plain_jpeg(64, 48, 77);
   constexpr std::uint32_t kWarm = 3, kFrames = 50;
   for (std::uint32_t i = 0; i < kFrames; ++i) {
     show(i);
