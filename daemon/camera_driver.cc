@@ -1,10 +1,11 @@
 #include "daemon/camera_driver.h"
 
+#include "drivers/live_camera.h"
 #if FARPOINT_WITH_V4L2
-#include "drivers/v4l2_camera.h"
+#include "drivers/v4l2_device.h"
 #endif
 #if FARPOINT_WITH_LIBCAMERA
-#include "drivers/libcamera_camera.h"
+#include "drivers/libcamera_device.h"
 #include "drivers/libcamera_loader.h"
 #endif
 
@@ -25,7 +26,8 @@ void require_name(const std::string& problem) {
 std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::CameraOptions& options) {
 #if FARPOINT_WITH_V4L2
   require_name(drivers::CameraPath::check(options.device));
-  return std::make_unique<drivers::V4l2Camera>(options, std::make_unique<drivers::LinuxV4l2System>());
+  auto device = std::make_unique<drivers::V4l2Device>(options, std::make_unique<drivers::LinuxV4l2System>());
+  return std::make_unique<drivers::LiveCamera>(options, std::move(device));
 #else
   fail_not_built("v4l2", "FARPOINT_V4L2");
 #endif
@@ -33,12 +35,13 @@ std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::Camer
 
 std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::CameraOptions& options) {
 #if FARPOINT_WITH_LIBCAMERA
-  require_name(drivers::LibcameraCamera::check(options.device));
+  require_name(drivers::LibcameraDevice::check(options.device));
   std::string problem;
   auto system = drivers::load_libcamera(drivers::libcamera_module_path(), &problem);
   if (!system)
     throw ConfigError("configuration: camera.driver: libcamera: its module cannot be loaded: " + problem);
-  return std::make_unique<drivers::LibcameraCamera>(options, std::move(system));
+  auto device = std::make_unique<drivers::LibcameraDevice>(options, std::move(system));
+  return std::make_unique<drivers::LiveCamera>(options, std::move(device));
 #else
   fail_not_built("libcamera", "FARPOINT_LIBCAMERA");
 #endif

@@ -26,10 +26,9 @@ class CameraSearch {
     said_ = CameraEvent::Kind::kStreaming;
     tell_(streaming);
   }
-  // `status`: negative errno.
-  void failed(CameraEvent::Kind kind, const char* what, int status, std::int64_t now_us) {
-    if (kind != said_) tell_({kind, what, -status, CameraFormat::kAuto, 0.0, false});
-    said_ = kind;
+  void failed(const CameraEvent& reason, std::int64_t now_us) {
+    if (reason.kind != said_) tell_(reason);
+    said_ = reason.kind;
     next_try_us_ = now_us + retry_us_;
     retry_us_ = std::min(2 * retry_us_, kLongestRetry_us);
   }

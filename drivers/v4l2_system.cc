@@ -1,7 +1,6 @@
 #include "drivers/v4l2_system.h"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -34,11 +33,6 @@ void* LinuxV4l2System::map(int fd, std::size_t bytes, std::int64_t offset) {
 
 void LinuxV4l2System::unmap(void* memory, std::size_t bytes) {
   munmap(memory, bytes);
-}
-
-int LinuxV4l2System::wait(int fd, int timeout_ms) {
-  pollfd descriptor{fd, POLLIN, 0};
-  return poll(&descriptor, 1, timeout_ms) > 0 ? 1 : 0;
 }
 
 }  // namespace farpoint::drivers

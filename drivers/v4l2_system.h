@@ -3,9 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
-
-#include "drivers/camera_time.h"
 
 namespace farpoint::drivers {
 
@@ -20,9 +17,6 @@ class V4l2System {
   // Null where it cannot be mapped.
   [[nodiscard]] virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;
   virtual void unmap(void* memory, std::size_t bytes) = 0;
-  // Until a frame or an error is there: 1; 0 after timeout_ms, or where a signal came. fd -1: only waits.
-  virtual int wait(int fd, int timeout_ms) = 0;
-  [[nodiscard]] virtual ClockReadings clocks() = 0;
 };
 
 class LinuxV4l2System final : public V4l2System {
@@ -32,8 +26,6 @@ class LinuxV4l2System final : public V4l2System {
   [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
-  int wait(int fd, int timeout_ms) override;
-  [[nodiscard]] ClockReadings clocks() override { return read_clocks(); }
 };
 
 }  // namespace farpoint::drivers

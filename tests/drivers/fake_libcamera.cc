@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <string_view>
 
 namespace farpoint::test {
 
@@ -12,33 +13,58 @@ using drivers::LibcameraFrame;
 using drivers::LibcameraSetting;
 using drivers::LibcameraStream;
 
+namespace {
+
+constexpr const char* kName = "fake";
+
+}  // namespace
+
+class FakeLibcamera::System final : public drivers::LibcameraSystem {
+ public:
+  explicit System(FakeLibcamera* camera) : camera_(camera) {}
+  ~System() override { close(); }
+  [[nodiscard]] int open(const char* name, drivers::FinishedRequests* finished, const char** what) override;
+  void close() override;
+  [[nodiscard]] int configure(CameraFormat format, int width_px, int height_px, int buffers,
+                              LibcameraStream* stream, const char** what) override;
+  [[nodiscard]] int start(const LibcameraSetting& setting, const char** what) override;
+  void read(std::uint32_t request, LibcameraFrame* frame) override;
+  [[nodiscard]] int give_back(std::uint32_t request, const LibcameraSetting& setting) override;
+
+ private:
+  FakeLibcamera* camera_;
+};
+
+// --- what tests ask for
+
 FakeLibcamera::FakeLibcamera() {
-  waits_ms.reserve(1 << 16);
   settings.reserve(1 << 10);
-  queued.reserve(drivers::FinishedRequests::kMaxRequests);
+}
+
+std::unique_ptr<drivers::CameraDevice> FakeLibcamera::make_device(drivers::CameraOptions options) {
+  options.device = kName;
+  return std::make_unique<drivers::LibcameraDevice>(options, std::make_unique<System>(this));
+}
+
+void FakeLibcamera::give_exposure_and_gain() {
+  gain_min = 100;
+  gain_max = 1600;
+  has.has_auto_exposure = has.has_exposure = has.has_gain = true;
+  has.range = {100, 50'000, gain_min, gain_max};
 }
 
 bool FakeLibcamera::show(const FakeShot& shot) {
-  if (!streaming || queued.empty()) return false;
-  const std::uint32_t request = queued.front();
-  queued.erase(queued.begin());
-  std::vector<std::uint8_t>& bytes = memory[request];
-  LibcameraFrame& frame = frames[request];
-  frame = {};
-  if (shot.bytes) {
-    const std::size_t count = std::min(shot.bytes->size(), bytes.size());
-    std::copy_n(shot.bytes->begin(), count, bytes.begin());
-    frame.bytes = {bytes.data(), count};
-  } else {
-    std::fill(bytes.begin(), bytes.end(), shot.grey);
-    frame.bytes = bytes;
-  }
-  frame.status = shot.status;
+  if (!streaming_) return false;
+  const auto filled = fill(shot);
+  if (!filled) return false;
+  LibcameraFrame& frame = frames_.at(filled->buffer);
+  frame.status = shot.damaged ? LibcameraFrame::Status::kDamaged : LibcameraFrame::Status::kOk;
+  frame.bytes = {memory_.at(filled->buffer).data(), filled->bytes};
   frame.sequence = shot.sequence;
   frame.stamp_us = shot.stamp_us.value_or(now.monotonic_us);
-  frame.exposure_us = shot.exposure_us;
-  frame.gain = shot.gain;
-  return finished->push(request);
+  frame.exposure_us = reported_exposure_us;
+  frame.gain = reported_gain;
+  return finished->push(filled->buffer);
 }
 
 void FakeLibcamera::unplug() {
@@ -46,10 +72,31 @@ void FakeLibcamera::unplug() {
   if (finished != nullptr) finished->set_removed();
 }
 
-int FakeLibcameraSystem::open(const char* name, drivers::FinishedRequests* finished, const char** what) {
-  camera_->device = name;
-  *what = "the fake has no camera";
-  if (!camera_->plugged) return -ENOENT;
+void FakeLibcamera::fail_stream() {
+  const std::uint32_t request = queued_.front();
+  queued_.erase(queued_.begin());
+  frames_.at(request).status = LibcameraFrame::Status::kCancelled;
+  (void)finished->push(request);
+}
+
+bool FakeLibcamera::is_readable(int fd) const {
+  pollfd descriptor{fd, POLLIN, 0};
+  return poll(&descriptor, 1, 0) > 0;
+}
+
+void FakeLibcamera::note(const LibcameraSetting& setting) {
+  if (setting.auto_exposure || setting.exposure_us || setting.gain || setting.frame_duration_us)
+    settings.push_back(setting);
+  if (setting.exposure_us) exposure_us = *setting.exposure_us;
+  if (setting.gain) gain = setting.gain;
+  if (setting.auto_exposure) is_automatic = setting.auto_exposure;
+}
+
+// --- what the driver calls
+
+int FakeLibcamera::System::open(const char* name, drivers::FinishedRequests* finished, const char** what) {
+  *what = "the fake has no such camera";
+  if (!camera_->plugged || std::string_view(name) != kName) return -ENOENT;
   *what = "another program has the fake";
   if (camera_->busy) return -EBUSY;
   camera_->finished = finished;
@@ -57,69 +104,53 @@ int FakeLibcameraSystem::open(const char* name, drivers::FinishedRequests* finis
   return 0;
 }
 
-void FakeLibcameraSystem::close() {
+void FakeLibcamera::System::close() {
   if (camera_->finished == nullptr) return;
   ++camera_->closed;
   // What is queued comes back cancelled, as libcamera's stop() does it.
-  for (const std::uint32_t request : camera_->queued) {
-    camera_->frames[request].status = LibcameraFrame::Status::kCancelled;
+  for (const std::uint32_t request : camera_->queued_) {
+    camera_->frames_[request].status = LibcameraFrame::Status::kCancelled;
     (void)camera_->finished->push(request);
   }
-  camera_->queued.clear();
-  camera_->streaming = false;
+  camera_->queued_.clear();
+  camera_->streaming_ = false;
   camera_->finished = nullptr;
 }
 
-int FakeLibcameraSystem::configure(CameraFormat format, int width_px, int height_px, int /*buffers*/,
-                                   LibcameraStream* stream, const char** /*what*/) {
+int FakeLibcamera::System::configure(CameraFormat format, int width_px, int height_px, int /*buffers*/,
+                                     LibcameraStream* stream, const char** /*what*/) {
   const auto& formats = camera_->formats;
   if (std::find(formats.begin(), formats.end(), format) == formats.end()) return -ENOTSUP;
   if (width_px != camera_->width_px || height_px != camera_->height_px) return -ENOTSUP;
   camera_->configured = format;
   const int bytes_a_pixel = format == CameraFormat::kYuyv ? 2 : 1;
-  camera_->row_stride = width_px * bytes_a_pixel + camera_->stride_padding;
   *stream = camera_->has;
-  stream->row_stride = camera_->row_stride;
+  stream->row_stride = width_px * bytes_a_pixel + camera_->stride_padding;
   stream->requests = camera_->requests;
   const auto count = static_cast<std::size_t>(camera_->requests);
-  const auto bytes = static_cast<std::size_t>(camera_->row_stride) * static_cast<std::size_t>(height_px);
-  camera_->memory.assign(count, std::vector<std::uint8_t>(bytes));
-  camera_->frames.assign(count, {});
+  const auto bytes = static_cast<std::size_t>(stream->row_stride) * static_cast<std::size_t>(height_px);
+  camera_->memory_.assign(count, std::vector<std::uint8_t>(bytes));
+  camera_->frames_.assign(count, {});
   return 0;
 }
 
-int FakeLibcameraSystem::start(const LibcameraSetting& setting, const char** /*what*/) {
-  note(setting);
-  camera_->streaming = true;
-  ++camera_->starts;
-  for (std::uint32_t i = 0; i < camera_->memory.size(); ++i) camera_->queued.push_back(i);
+int FakeLibcamera::System::start(const LibcameraSetting& setting, const char** /*what*/) {
+  camera_->note(setting);
+  camera_->streaming_ = true;
+  ++camera_->streams;
+  for (std::uint32_t i = 0; i < camera_->memory_.size(); ++i) camera_->queued_.push_back(i);
   return 0;
 }
 
-void FakeLibcameraSystem::read(std::uint32_t request, LibcameraFrame* frame) {
-  *frame = camera_->frames[request];
+void FakeLibcamera::System::read(std::uint32_t request, LibcameraFrame* frame) {
+  *frame = camera_->frames_[request];
 }
 
-int FakeLibcameraSystem::give_back(std::uint32_t request, const LibcameraSetting& setting) {
-  if (camera_->queue_error != 0) return -camera_->queue_error;
-  note(setting);
-  camera_->queued.push_back(request);
+int FakeLibcamera::System::give_back(std::uint32_t request, const LibcameraSetting& setting) {
+  if (camera_->give_back_error != 0) return -camera_->give_back_error;
+  camera_->note(setting);
+  camera_->queued_.push_back(request);
   return 0;
-}
-
-void FakeLibcameraSystem::note(const LibcameraSetting& setting) {
-  if (setting.auto_exposure || setting.exposure_us || setting.gain || setting.frame_duration_us)
-    camera_->settings.push_back(setting);
-}
-
-void FakeCameraWait::wait(int fd, int timeout_ms) {
-  camera_->waits_ms.push_back(timeout_ms);
-  pollfd descriptor{fd, POLLIN, 0};
-  const bool something = poll(&descriptor, 1, 0) > 0;
-  const std::int64_t passed_us = something ? 1000 : std::int64_t{1000} * timeout_ms;
-  camera_->now.monotonic_us += passed_us;
-  camera_->now.boottime_us += passed_us;
-  camera_->now.realtime_us += passed_us;
 }
 
 }  // namespace farpoint::test

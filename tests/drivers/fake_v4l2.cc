@@ -1,77 +1,127 @@
 #include "tests/drivers/fake_v4l2.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <tuple>
-#include <utility>
 
 namespace farpoint::test {
+
+using drivers::CameraFormat;
+
 namespace {
 
+constexpr const char* kPath = "/dev/null";  // exists; nothing else is opened
 constexpr int kFd = 77;
+constexpr double kExposureUnit_us = 100.0;
 
-std::vector<std::uint32_t> codes_of(const FakeCamera& camera) {
-  std::vector<std::uint32_t> codes;
-  for (const FakeFormat& f : camera.formats)
-    if (std::find(codes.begin(), codes.end(), f.code) == codes.end()) codes.push_back(f.code);
-  return codes;
+struct Code {
+  CameraFormat format;
+  std::uint32_t code;
+};
+constexpr std::array kCodes = {
+    Code{CameraFormat::kGrey, V4L2_PIX_FMT_GREY}, Code{CameraFormat::kNv12, V4L2_PIX_FMT_NV12},
+    Code{CameraFormat::kYuyv, V4L2_PIX_FMT_YUYV}, Code{CameraFormat::kMjpeg, V4L2_PIX_FMT_MJPEG}};
+
+std::uint32_t code_of(CameraFormat format) {
+  return std::find_if(kCodes.begin(), kCodes.end(), [=](const Code& c) { return c.format == format; })->code;
 }
 
-int bytes_a_pixel(std::uint32_t code) {
-  return code == V4L2_PIX_FMT_YUYV ? 2 : code == V4L2_PIX_FMT_MJPEG ? 0 : 1;
-}
-
-void advance(FakeCamera* camera, std::int64_t ms) {
-  camera->waited_ms += ms;
-  camera->now.monotonic_us += 1000 * ms;
-  camera->now.boottime_us += 1000 * ms;
-  camera->now.realtime_us += 1000 * ms;
+std::uint32_t bytes_a_pixel(CameraFormat format) {
+  return format == CameraFormat::kYuyv ? 2 : format == CameraFormat::kMjpeg ? 0 : 1;
 }
 
 }  // namespace
 
-FakeFrame fake_frame(const FakeCamera& camera, std::uint32_t sequence, std::uint8_t grey) {
-  FakeFrame frame;
-  frame.bytes.assign(static_cast<std::size_t>(camera.set.sizeimage), grey);
-  frame.sequence = sequence;
-  frame.stamp_us = camera.now.monotonic_us;
-  return frame;
+class FakeV4l2::System final : public drivers::V4l2System {
+ public:
+  explicit System(FakeV4l2* camera) : camera_(camera) {}
+  [[nodiscard]] int open(const char* path) override;
+  void close(int fd) override;
+  [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
+  [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
+  void unmap(void* memory, std::size_t bytes) override;
+
+ private:
+  int list_format(v4l2_fmtdesc* entry);
+  int list_size(v4l2_frmsizeenum* entry);
+  int list_interval(v4l2_frmivalenum* entry);
+  int set_format(v4l2_format* format);
+  int request_buffers(v4l2_requestbuffers* request);
+  int queue(const v4l2_buffer& buffer);
+  int dequeue(v4l2_buffer* buffer);
+  int control(unsigned long request, void* argument);
+  void note(const v4l2_control& control);
+  [[nodiscard]] const CameraFormat* find(std::uint32_t code) const;
+  [[nodiscard]] std::size_t buffer_bytes() const { return camera_->set_.sizeimage; }
+
+  FakeV4l2* camera_;
+};
+
+// --- what tests ask for
+
+FakeV4l2::FakeV4l2() {
+  images_.reserve(32);
 }
 
-int FakeV4l2System::open(const char* path) {
-  if (!camera_->plugged || std::strcmp(path, "/dev/null") != 0) return -ENOENT;
+std::unique_ptr<drivers::CameraDevice> FakeV4l2::make_device(drivers::CameraOptions options) {
+  options.device = kPath;
+  return std::make_unique<drivers::V4l2Device>(options, std::make_unique<System>(this));
+}
+
+void FakeV4l2::give_exposure_and_gain() {
+  gain_min = 0;
+  gain_max = 100;
+  control_ranges[V4L2_CID_EXPOSURE_AUTO] = {0, 3};
+  control_ranges[V4L2_CID_EXPOSURE_ABSOLUTE] = {1, 500};
+  control_ranges[V4L2_CID_GAIN] = {gain_min, gain_max};
+}
+
+bool FakeV4l2::show(const FakeShot& shot) {
+  const auto filled = fill(shot);
+  if (!filled) return false;
+  const std::uint32_t error = shot.damaged ? V4L2_BUF_FLAG_ERROR : 0;
+  images_.push_back({*filled, shot.sequence, flags | error, shot.stamp_us.value_or(now.monotonic_us)});
+  return true;
+}
+
+void FakeV4l2::unplug() {
+  plugged = false;
+  images_.clear();
+}
+
+bool FakeV4l2::is_readable(int fd) const {
+  return fd == kFd && (!images_.empty() || stream_error_ != 0 || !plugged);
+}
+
+// --- what the driver calls
+
+int FakeV4l2::System::open(const char* path) {
+  if (!camera_->plugged || std::strcmp(path, kPath) != 0) return -ENOENT;
   ++camera_->opened;
-  camera_->queued.clear();
-  camera_->streaming = false;
   return kFd;
 }
 
-void FakeV4l2System::close(int) {
+void FakeV4l2::System::close(int) {
   ++camera_->closed;
+  camera_->queued_.clear();
+  camera_->images_.clear();
 }
 
-void* FakeV4l2System::map(int, std::size_t bytes, std::int64_t offset) {
+void* FakeV4l2::System::map(int, std::size_t bytes, std::int64_t offset) {
   const auto index = static_cast<std::size_t>(offset);
-  if (index >= camera_->memory.size() || bytes != camera_->memory[index].size()) return nullptr;
+  if (index >= camera_->memory_.size() || bytes != camera_->memory_[index].size()) return nullptr;
   ++camera_->mapped;
-  return camera_->memory[index].data();
+  return camera_->memory_[index].data();
 }
 
-void FakeV4l2System::unmap(void*, std::size_t) {
+void FakeV4l2::System::unmap(void*, std::size_t) {
   ++camera_->unmapped;
 }
 
-int FakeV4l2System::wait(int fd, int timeout_ms) {
-  camera_->waits_ms.push_back(timeout_ms);
-  const bool something =
-      fd >= 0 && (!camera_->frames.empty() || camera_->stream_error != 0 || !camera_->plugged);
-  advance(camera_.get(), something ? 1 : timeout_ms);
-  return something ? 1 : 0;
-}
-
-int FakeV4l2System::ioctl(int, unsigned long request, void* argument) {
+int FakeV4l2::System::ioctl(int, unsigned long request, void* argument) {
   if (!camera_->plugged) return -ENODEV;
   switch (request) {
     case VIDIOC_QUERYCAP: {
@@ -103,94 +153,90 @@ int FakeV4l2System::ioctl(int, unsigned long request, void* argument) {
       return 0;
     }
     case VIDIOC_QBUF:
-      camera_->queued.push_back(static_cast<v4l2_buffer*>(argument)->index);
-      return 0;
+      return queue(*static_cast<v4l2_buffer*>(argument));
     case VIDIOC_DQBUF:
       return dequeue(static_cast<v4l2_buffer*>(argument));
     case VIDIOC_STREAMON:
-      camera_->streaming = true;
       ++camera_->streams;
       return 0;
     case VIDIOC_STREAMOFF:
-      camera_->streaming = false;
       return 0;
     default:
       return control(request, argument);
   }
 }
 
-int FakeV4l2System::list_format(v4l2_fmtdesc* entry) {
-  const auto codes = codes_of(*camera_);
-  if (entry->index >= codes.size()) return -EINVAL;
-  entry->pixelformat = codes[entry->index];
+const CameraFormat* FakeV4l2::System::find(std::uint32_t code) const {
+  for (const CameraFormat& format : camera_->formats)
+    if (code_of(format) == code) return &format;
+  return nullptr;
+}
+
+int FakeV4l2::System::list_format(v4l2_fmtdesc* entry) {
+  if (entry->index >= camera_->formats.size()) return -EINVAL;
+  entry->pixelformat = code_of(camera_->formats[entry->index]);
   return 0;
 }
 
-int FakeV4l2System::list_size(v4l2_frmsizeenum* entry) {
-  std::uint32_t index = 0;
-  for (const FakeFormat& f : camera_->formats) {
-    if (f.code != entry->pixel_format || index++ != entry->index) continue;
-    entry->type = V4L2_FRMSIZE_TYPE_DISCRETE;
-    entry->discrete = {static_cast<std::uint32_t>(f.width), static_cast<std::uint32_t>(f.height)};
-    return 0;
-  }
-  return -EINVAL;
-}
-
-int FakeV4l2System::list_interval(v4l2_frmivalenum* entry) {
-  for (const FakeFormat& f : camera_->formats) {
-    if (f.code != entry->pixel_format || f.width != static_cast<int>(entry->width) || entry->index > 0)
-      continue;
-    entry->type = V4L2_FRMIVAL_TYPE_DISCRETE;
-    entry->discrete = {1000, static_cast<std::uint32_t>(std::lround(1000 * f.fastest_hz))};
-    return 0;
-  }
-  return -EINVAL;
-}
-
-int FakeV4l2System::set_format(v4l2_format* format) {
-  v4l2_pix_format& pix = format->fmt.pix;
-  for (const FakeFormat& f : camera_->formats) {
-    if (f.code != pix.pixelformat || f.width != static_cast<int>(pix.width)) continue;
-    if (camera_->takes_other_size) pix.width -= 4;
-    pix.bytesperline = pix.width * static_cast<std::uint32_t>(bytes_a_pixel(f.code)) +
-                       static_cast<std::uint32_t>(f.stride_padding);
-    pix.sizeimage = f.code == V4L2_PIX_FMT_MJPEG  ? pix.width * pix.height
-                    : f.code == V4L2_PIX_FMT_NV12 ? pix.bytesperline * pix.height * 3 / 2
-                                                  : pix.bytesperline * pix.height;
-    camera_->set = pix;
-    return 0;
-  }
-  return -EINVAL;
-}
-
-std::size_t FakeV4l2System::buffer_bytes() const {
-  return camera_->set.sizeimage;
-}
-
-int FakeV4l2System::request_buffers(v4l2_requestbuffers* request) {
-  camera_->memory.assign(request->count, std::vector<std::uint8_t>(buffer_bytes()));
+int FakeV4l2::System::list_size(v4l2_frmsizeenum* entry) {
+  if (find(entry->pixel_format) == nullptr || entry->index > 0) return -EINVAL;
+  entry->type = V4L2_FRMSIZE_TYPE_DISCRETE;
+  entry->discrete = {static_cast<std::uint32_t>(camera_->width_px),
+                     static_cast<std::uint32_t>(camera_->height_px)};
   return 0;
 }
 
-int FakeV4l2System::dequeue(v4l2_buffer* buffer) {
-  if (camera_->stream_error != 0) return -std::exchange(camera_->stream_error, 0);
-  if (camera_->frames.empty() || camera_->queued.empty()) return -EAGAIN;
-  const FakeFrame frame = std::move(camera_->frames.front());
-  camera_->frames.pop_front();
-  buffer->index = camera_->queued.front();
-  camera_->queued.erase(camera_->queued.begin());
-  std::vector<std::uint8_t>& memory = camera_->memory[buffer->index];
-  std::copy_n(frame.bytes.begin(), std::min(frame.bytes.size(), memory.size()), memory.begin());
-  buffer->bytesused = static_cast<std::uint32_t>(frame.bytes.size());
-  buffer->sequence = frame.sequence;
-  buffer->flags = frame.flags;
-  buffer->timestamp.tv_sec = frame.stamp_us / 1'000'000;
-  buffer->timestamp.tv_usec = frame.stamp_us % 1'000'000;
+int FakeV4l2::System::list_interval(v4l2_frmivalenum* entry) {
+  const CameraFormat* format = find(entry->pixel_format);
+  if (format == nullptr || camera_->width_px != static_cast<int>(entry->width) || entry->index > 0)
+    return -EINVAL;
+  const auto limit = camera_->fastest_hz.find(*format);
+  const double fastest_hz = limit == camera_->fastest_hz.end() ? 30.0 : limit->second;
+  entry->type = V4L2_FRMIVAL_TYPE_DISCRETE;
+  entry->discrete = {1000, static_cast<std::uint32_t>(std::lround(1000 * fastest_hz))};
   return 0;
 }
 
-int FakeV4l2System::control(unsigned long request, void* argument) {
+int FakeV4l2::System::set_format(v4l2_format* wanted) {
+  v4l2_pix_format& pix = wanted->fmt.pix;
+  const CameraFormat* format = find(pix.pixelformat);
+  if (format == nullptr || camera_->width_px != static_cast<int>(pix.width)) return -EINVAL;
+  if (camera_->takes_other_size) pix.width -= 4;
+  pix.bytesperline = pix.width * bytes_a_pixel(*format) + static_cast<std::uint32_t>(camera_->stride_padding);
+  pix.sizeimage = *format == CameraFormat::kMjpeg  ? pix.width * pix.height
+                  : *format == CameraFormat::kNv12 ? pix.bytesperline * pix.height * 3 / 2
+                                                   : pix.bytesperline * pix.height;
+  camera_->set_ = pix;
+  camera_->configured = *format;
+  return 0;
+}
+
+int FakeV4l2::System::request_buffers(v4l2_requestbuffers* request) {
+  camera_->memory_.assign(request->count, std::vector<std::uint8_t>(buffer_bytes()));
+  return 0;
+}
+
+int FakeV4l2::System::queue(const v4l2_buffer& buffer) {
+  if (camera_->give_back_error != 0) return -camera_->give_back_error;
+  camera_->queued_.push_back(buffer.index);
+  return 0;
+}
+
+int FakeV4l2::System::dequeue(v4l2_buffer* buffer) {
+  if (camera_->stream_error_ != 0) return -std::exchange(camera_->stream_error_, 0);
+  if (camera_->images_.empty()) return -EAGAIN;
+  const Image image = camera_->images_.front();
+  camera_->images_.erase(camera_->images_.begin());
+  buffer->index = image.filled.buffer;
+  buffer->bytesused = static_cast<std::uint32_t>(image.filled.bytes);
+  buffer->sequence = image.sequence;
+  buffer->flags = image.flags;
+  buffer->timestamp.tv_sec = image.stamp_us / 1'000'000;
+  buffer->timestamp.tv_usec = image.stamp_us % 1'000'000;
+  return 0;
+}
+
+int FakeV4l2::System::control(unsigned long request, void* argument) {
   if (request == VIDIOC_QUERYCTRL) {
     auto* q = static_cast<v4l2_queryctrl*>(argument);
     if (!camera_->control_ranges.contains(q->id)) return -EINVAL;
@@ -207,7 +253,14 @@ int FakeV4l2System::control(unsigned long request, void* argument) {
   }
   if (c->value < min || c->value > max) return -ERANGE;
   camera_->controls[c->id] = c->value;
+  note(*c);
   return 0;
+}
+
+void FakeV4l2::System::note(const v4l2_control& set) {
+  if (set.id == V4L2_CID_EXPOSURE_ABSOLUTE) camera_->exposure_us = kExposureUnit_us * set.value;
+  if (set.id == V4L2_CID_GAIN) camera_->gain = set.value;
+  if (set.id == V4L2_CID_EXPOSURE_AUTO) camera_->is_automatic = set.value == V4L2_EXPOSURE_AUTO;
 }
 
 }  // namespace farpoint::test

@@ -3,17 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <random>
 #include <string>
 
-#include <jpeglib.h>
 #include <png.h>
+
+#include "tests/ipc/jpeg_images.h"
 
 namespace farpoint::ipc {
 namespace {
 
+using test::to_jpeg;
 using Bytes = std::vector<std::uint8_t>;
 
 // A smooth picture: JPEG keeps it within a few grey levels.
@@ -27,34 +28,6 @@ Bytes picture(int width_px, int height_px, int channels) {
     }
   }
   return out;
-}
-
-Bytes to_jpeg(const Bytes& pixels, int width_px, int height_px, int channels, bool progressive = false) {
-  jpeg_compress_struct jpeg{};
-  jpeg_error_mgr errors{};
-  jpeg.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&jpeg);
-  unsigned char* out = nullptr;
-  unsigned long size = 0;
-  jpeg_mem_dest(&jpeg, &out, &size);
-  jpeg.image_width = static_cast<JDIMENSION>(width_px);
-  jpeg.image_height = static_cast<JDIMENSION>(height_px);
-  jpeg.input_components = channels;
-  jpeg.in_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
-  jpeg_set_defaults(&jpeg);
-  jpeg_set_quality(&jpeg, 95, TRUE);
-  if (progressive) jpeg_simple_progression(&jpeg);
-  jpeg_start_compress(&jpeg, TRUE);
-  while (jpeg.next_scanline < jpeg.image_height) {
-    JSAMPROW row =
-        const_cast<JSAMPROW>(pixels.data() + jpeg.next_scanline * static_cast<unsigned>(width_px * channels));
-    jpeg_write_scanlines(&jpeg, &row, 1);
-  }
-  jpeg_finish_compress(&jpeg);
-  jpeg_destroy_compress(&jpeg);
-  Bytes bytes(out, out + size);
-  std::free(out);
-  return bytes;
 }
 
 Bytes to_png(const Bytes& pixels, int width_px, int height_px, int type, int depth, int interlace) {
