@@ -3,10 +3,17 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "daemon/rate.h"
 
 namespace farpoint::daemon {
+namespace {
+
+constexpr std::string_view kCalibrationContradicted =
+    "the images contradict the calibration (another camera, focus or resolution?): no pose is valid";
+
+}  // namespace
 
 FrameReporter::FrameReporter(const Config& config, const Names& names, std::vector<PoseSink*> sinks,
                              Publisher* publisher, MapBoard* maps, std::int64_t pool_bytes,
@@ -23,6 +30,7 @@ FrameReporter::FrameReporter(const Config& config, const Names& names, std::vect
   status_.build = names.build;
   status_.configuration_hash = names.configuration_hash;
   status_.calibration_hash = names.calibration_hash;
+  status_.message.reserve(kCalibrationContradicted.size());
 }
 
 const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCounts& out) {
@@ -145,6 +153,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.keyframes = static_cast<std::int32_t>(counts.keyframes);
   s.landmarks = static_cast<std::int32_t>(counts.landmarks);
   s.vmps = static_cast<std::int32_t>(counts.vmps);
+  s.message = counts.calibration_contradicted ? kCalibrationContradicted : std::string_view{};
   s.times_lost = static_cast<std::int64_t>(counts.lost);
   s.capture_queue = chance.capture_queue;
   s.mapping_queue = r.jobs_under_way;

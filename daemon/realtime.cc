@@ -23,11 +23,25 @@ const char* name_of(int policy) {
   return policy == SCHED_FIFO ? "SCHED_FIFO" : policy == SCHED_RR ? "SCHED_RR" : "ordinary scheduling";
 }
 
+// Bytes between here and the end of the calling thread's stack: less than it was given, for the libraries'
+// thread-local variables lie in it too. 0: unknown.
+std::size_t stack_left() {
+  pthread_attr_t attributes;
+  if (pthread_getattr_np(pthread_self(), &attributes) != 0) return 0;
+  void* end = nullptr;
+  std::size_t bytes = 0;
+  const bool known = pthread_attr_getstack(&attributes, &end, &bytes) == 0;
+  pthread_attr_destroy(&attributes);
+  const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0));
+  return known ? here - reinterpret_cast<std::uintptr_t>(end) : 0;
+}
+
 // The kernel hands out a stack page by page as it is first used: use all of it now.
-void touch_stack(std::size_t bytes) {
+void touch_stack() {
   constexpr std::size_t kLeftForOthers = 64 << 10, kPage = 4096;
-  if (bytes <= 2 * kLeftForOthers) return;
-  const std::size_t touched = bytes - kLeftForOthers;
+  const std::size_t left = stack_left();
+  if (left <= 2 * kLeftForOthers) return;
+  const std::size_t touched = left - kLeftForOthers;
   auto* stack = static_cast<volatile char*>(alloca(touched));
   for (std::size_t i = 0; i < touched; i += kPage) stack[i] = 0;
 }
@@ -98,7 +112,7 @@ void RealtimeReport::print() const {
 
 Thread::Thread(const char* name, const RealtimeConfig& config, const ThreadConfig& wanted,
                RealtimeReport* report, std::function<void()> body)
-    : body_(std::move(body)), stack_bytes_(static_cast<std::size_t>(config.stack_kb) << 10) {
+    : body_(std::move(body)) {
   ThreadConfig got = wanted;
   int error = start(config, got);
   // A refusal may throw: no thread may run then.
@@ -127,7 +141,7 @@ Thread::Thread(const char* name, const RealtimeConfig& config, const ThreadConfi
 int Thread::start(const RealtimeConfig& config, const ThreadConfig& wanted) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, stack_bytes_);
+  pthread_attr_setstacksize(&attributes, static_cast<std::size_t>(config.stack_kb) << 10);
   if (wanted.priority > 0) {
     const sched_param parameters{wanted.priority};
     pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
@@ -181,7 +195,7 @@ double Thread::cpu_s() const {
 
 void* Thread::enter(void* self) {
   auto* thread = static_cast<Thread*>(self);
-  touch_stack(thread->stack_bytes_);
+  touch_stack();
   thread->body_();
   return nullptr;
 }

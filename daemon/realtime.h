@@ -67,7 +67,6 @@ class Thread {
   void say_what_it_got(const char* name, RealtimeReport* report) const;
 
   std::function<void()> body_;
-  std::size_t stack_bytes_ = 0;
   pthread_t handle_{};
   clockid_t clock_{};
   bool joined_ = false;

@@ -91,6 +91,7 @@ struct EstimatorCounts {
                 vmp_evicted = 0;
   std::uint64_t local_ba = 0;
   std::uint32_t keyframes = 0, landmarks = 0, vmps = 0;  // alive now
+  bool calibration_contradicted = false;  // now: the images say that camera 0's is wrong, no pose is valid
 };
 
 struct PosedFrame {

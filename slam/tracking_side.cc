@@ -246,6 +246,7 @@ void TrackingSide::note_counts(const MappingReply& reply) {
   counts_.vmp_evicted = m.vmp_evicted;
   counts_.local_ba = m.local_ba;
   counts_.vmps = m.vmp_alive;
+  counts_.calibration_contradicted = m.calibration_contradicted;
   counts_.keyframes = reply.keyframes;
   counts_.landmarks = reply.landmarks;
 }

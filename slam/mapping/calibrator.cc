@@ -269,6 +269,8 @@ bool Calibrator::update(const BundleProblem& problem,
   const Camera next = refined_camera(given_, best);
   if (!Camera::check(next.parameters()).empty()) return false;
   delta_ = best;
+  constexpr double kContradicts = 5.0, kAgrees = 3.0;
+  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
   return true;
 }
 

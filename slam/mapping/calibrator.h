@@ -10,6 +10,7 @@
 // one part in `keyframes of the window` is kept, and fades as the map gets better.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "slam/config.h"
@@ -35,6 +36,12 @@ class Calibrator {
   [[nodiscard]] const CalibrationDelta& delta() const { return delta_; }
   // 1 sigma of delta.
   [[nodiscard]] CalibrationDelta sigma() const;
+  // How far the estimate lies from the given calibration, in standard deviations of the prior (Mahalanobis).
+  [[nodiscard]] double surprise() const { return std::sqrt(delta_.dot(prior_ * delta_)); }
+  // True where the images say that the given calibration is of another camera, focus or resolution: what is
+  // that far off has not been refined, only bent towards what fits. From 5 sigma (1.5 % of the focal length),
+  // and until 3; sound calibrations are within 2.
+  [[nodiscard]] bool contradicts_given() const { return contradicts_given_; }
   [[nodiscard]] Camera camera() const { return refined_camera(given_, delta_); }
 
  private:
@@ -50,6 +57,7 @@ class Calibrator {
   CalibrationConfig config_;
   Camera given_;
   CalibrationDelta delta_ = CalibrationDelta::Zero();
+  bool contradicts_given_ = false;
   // What is kept: information matrix and vector, the prior included.
   Eigen::Matrix4d prior_, information_;
   Eigen::Vector4d information_vector_ = Eigen::Vector4d::Zero();

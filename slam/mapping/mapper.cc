@@ -453,6 +453,7 @@ void Mapper::refine_calibration() {
       problem_.points[i].measurements = 0;  // found wrong since: it has no say
   }
   if (calibrator_.update(problem_, d_bearing)) map_.set_camera(0, calibrator_.camera());
+  counts_.calibration_contradicted = calibrator_.contradicts_given();
 }
 
 void Mapper::take_back() {
@@ -496,7 +497,7 @@ void Mapper::update_settling(double scale_change) {
   constexpr double kSteady = 0.02;
   constexpr int kSteadyOptimisations = 3;
   const bool steady = std::fabs(std::log(scale_change)) < kSteady;
-  if (!consistent()) {
+  if (!consistent() || calibrator_.contradicts_given()) {
     // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its
     // poses are not what they claim, however many inliers they have.
     settled_ = false;

@@ -12,6 +12,7 @@ struct MappingCounts {
                 vmp_evicted = 0;
   std::uint64_t local_ba = 0;
   std::uint32_t vmp_alive = 0;
+  bool calibration_contradicted = false;  // now: by the images, Calibrator::contradicts_given()
 };
 
 }  // namespace farpoint::slam

@@ -1,6 +1,7 @@
 #include "tests/ipc/allocations.h"
 
 #include <atomic>
+#include <cerrno>
 #include <cstddef>
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(__GLIBC__)
@@ -45,6 +46,11 @@ void* realloc(void* block, std::size_t size) noexcept {
 void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
   ++calls;
   return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
+  ++calls;
+  *block = __libc_memalign(alignment, size);
+  return *block == nullptr ? ENOMEM : 0;
 }
 }
 #endif

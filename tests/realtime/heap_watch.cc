@@ -41,7 +41,7 @@ std::atomic<std::size_t> trace_count{0};
 thread_local ThreadCount* own = nullptr;
 thread_local bool noting = false;  // what is done to note a call may call the heap itself
 
-void note() {
+[[maybe_unused]] void note() {
   if (!watching.load(std::memory_order_relaxed) || noting) return;
   noting = true;
   if (own == nullptr) {
