@@ -1,6 +1,6 @@
-// A live camera: one interface, whatever drives it. All calls but make-up and end are of one thread, the
-// capture thread: next() is its only waiting place, makes no heap call after the first images and writes no
-// log; what an operator should know goes to a listener.
+// A live camera: one interface, whatever drives it. All calls but make-up, end and set_exposure() are of one
+// thread, the capture thread: next() is its only waiting place, makes no heap call after the first images and
+// writes no log; what an operator should know goes to a listener.
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,7 @@ LiveCamera::LiveCamera(const CameraOptions& options, std::unique_ptr<CameraDevic
       stall_us_(static_cast<std::int64_t>(kMicros * options.stall_s)) {}
 
 bool LiveCamera::next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame) {
-  if (!is_streaming()) {
+  if (!streaming_) {
     if (const int until_try_ms = search_.wait_ms(now_us()); until_try_ms > 0) {
       wait_->wait(-1, std::min(timeout_ms, until_try_ms));
       return false;
@@ -41,14 +41,14 @@ bool LiveCamera::open() {
   ++intake_.counts.opened;
   intake_.start_stream();
   last_frame_us_ = now_us();
-  streaming_.store(true, std::memory_order_relaxed);
+  streaming_ = true;
   search_.found(outcome);
   return true;
 }
 
 void LiveCamera::leave(const CameraEvent& reason) {
   device_->close();
-  streaming_.store(false, std::memory_order_relaxed);
+  streaming_ = false;
   search_.failed(reason, now_us());
 }
 

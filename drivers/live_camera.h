@@ -2,7 +2,6 @@
 // more images.
 #pragma once
 
-#include <atomic>
 #include <memory>
 
 #include "drivers/camera.h"
@@ -21,7 +20,7 @@ class LiveCamera final : public Camera {
              std::unique_ptr<CameraWait> wait = std::make_unique<CameraWait>());
 
   [[nodiscard]] bool next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame) override;
-  [[nodiscard]] bool is_streaming() const override { return streaming_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool is_streaming() const override { return streaming_; }
   [[nodiscard]] const CameraCounts& counts() const override { return intake_.counts; }
   void on_event(std::function<void(const CameraEvent&)> listener) override {
     search_.on_event(std::move(listener));
@@ -42,7 +41,7 @@ class LiveCamera final : public Camera {
   CameraSearch search_;
   FrameIntake intake_;
   ExposureMailbox new_exposure_;
-  std::atomic<bool> streaming_{false};
+  bool streaming_ = false;
   std::int64_t stall_us_;
   std::int64_t last_frame_us_ = 0;  // when the stream last gave anything
 };

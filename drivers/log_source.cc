@@ -85,9 +85,8 @@ bool LogSource::decode_message(const ipc::LogEvent& event, Message* message) {
 // True where the stream may go on with this time.
 bool LogSource::accept_time(std::int64_t utime, bool check_leap, Stream* stream) {
   const bool is_later = stream->last == Stream::kNone || utime > stream->last;
-  const bool leaps = check_leap && stream->last != Stream::kNone && is_later &&
-                     static_cast<std::uint64_t>(utime) - static_cast<std::uint64_t>(stream->last) >
-                         static_cast<std::uint64_t>(kMaxLeap_us);
+  const bool leaps =
+      check_leap && stream->last != Stream::kNone && is_later && step_us(stream->last, utime) > kMaxLeap_us;
   const bool borne_out = stream->doubtful != Stream::kNone && utime > stream->doubtful;
   if (!is_later || (leaps && !borne_out)) {
     stream->doubtful = leaps ? utime : Stream::kNone;

@@ -21,12 +21,12 @@ struct LogSourceCounts {
   std::uint64_t images = 0, imu = 0, wheels = 0, calibrations = 0, ground_truths = 0;
   // Refused.
   std::uint64_t messages_undecodable = 0;  // damaged LCM messages on known channels
-  std::uint64_t images_unknown_camera =
-      0;                                // the calibration has no such camera, or channel and message disagree
-  std::uint64_t images_wrong_size = 0;  // not the calibration's, or not what the message itself says
+  // The calibration has no such camera, or channel and message disagree.
+  std::uint64_t images_unknown_camera = 0;
+  std::uint64_t images_wrong_size = 0;   // not the calibration's, or not what the message itself says
   std::uint64_t images_undecodable = 0;  // damaged JPEG or PNG, unknown pixel format
-  std::uint64_t times_backwards =
-      0;  // not after the one before it, or a leap ahead that what follows does not bear out
+  // Not after the one before it, or a leap ahead that what follows does not bear out.
+  std::uint64_t times_backwards = 0;
   std::uint64_t imu_invalid = 0;            // not finite, or beyond any sensor's range
   std::uint64_t wheels_invalid = 0;         // infinite
   std::uint64_t ground_truths_invalid = 0;  // not finite, or no rotation

@@ -49,6 +49,12 @@ bool WheelReader::take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t*
     wheel.heard = true;
   }
   if (!std::all_of(wheels_.begin(), wheels_.end(), [](const Wheel& w) { return w.heard; })) return false;
+  give(utime, message);
+  for (Wheel& wheel : wheels_) wheel.heard = false;
+  return true;
+}
+
+void WheelReader::give(std::int64_t utime, wheels_t* message) const {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   message->utime = utime;
   message->speed_sigma = -1.0;
@@ -59,13 +65,11 @@ bool WheelReader::take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t*
   int known = 0;
   for (std::size_t i = 0; i < wheels_.size(); ++i) {
     message->wheel_speed[i] = wheels_[i].speed_m_s;
-    wheels_[i].heard = false;
     if (std::isnan(wheels_[i].speed_m_s)) continue;
     sum += wheels_[i].speed_m_s;
     ++known;
   }
   message->speed = known > 0 ? sum / known : kNan;
-  return true;
 }
 
 std::vector<std::uint32_t> WheelReader::ids() const {

@@ -18,7 +18,7 @@ class WheelReader {
 
   // True where the frame completes a measurement: every wheel heard since the last one. A wheel that says
   // 'not available' is NaN; the vehicle's speed is the mean of the others. No allocation.
-  [[nodiscard]] bool take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t* wheels);
+  [[nodiscard]] bool take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t* message);
 
   // Identifiers to listen to.
   [[nodiscard]] std::vector<std::uint32_t> ids() const;
@@ -30,6 +30,8 @@ class WheelReader {
     double speed_m_s = 0.0;
     bool heard = false;
   };
+  void give(std::int64_t utime, wheels_t* message) const;
+
   std::vector<Wheel> wheels_;
 };
 
