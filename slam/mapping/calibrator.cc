@@ -66,7 +66,8 @@ class WindowEquations {
     couplings_.clear();
     HostSums sums;
     for (int i = 0; i < point.measurements; ++i) {
-      BundleProblem::Measurement m = p_.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      BundleProblem::Measurement m = p_.measurements[static_cast<std::size_t>(index)];
       if (m.pose == point.host || m.chi2 > kChi2TwoDof) continue;
       m.sigma_px /= std::sqrt(point.weight);
       add_measurement(point, m, d_xyz_d_delta, &sums);
@@ -194,6 +195,12 @@ class WindowEquations {
   std::vector<Coupling> couplings_;
 };
 
+Eigen::Matrix4d prior_information(const CalibrationConfig& config) {
+  const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
+                      config.distortion_sigma);
+  return sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
 }  // namespace
 
 Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
@@ -207,12 +214,7 @@ Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
 }
 
 Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given)
-    : config_(config), given_(given) {
-  const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
-                      config.distortion_sigma);
-  prior_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
-  information_ = prior_;
-}
+    : config_(config), given_(given), prior_(prior_information(config)), information_(prior_) {}
 
 CalibrationDelta Calibrator::sigma() const {
   return information_.inverse().diagonal().cwiseSqrt();

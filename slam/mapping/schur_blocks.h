@@ -61,7 +61,8 @@ class BlockMatrix {
 
  private:
   [[nodiscard]] std::size_t index(int row, int column) const {
-    return static_cast<std::size_t>(column * (column + 1) / 2 + row);
+    const int i = column * (column + 1) / 2 + row;
+    return static_cast<std::size_t>(i);
   }
   int blocks_ = 0;
   std::vector<Matrix6d> data_;
