@@ -474,10 +474,10 @@ void Mapper::take_back() {
     l.inverse_depth = point.inverse_depth;
     l.inverse_depth_sigma = point.inverse_depth_sigma;
     outliers.clear();
-    int index = 0;
+    int index = point.first_measurement;
     for (const Observation& o : l.observations) {
       if (o.sigma_px <= 0.0F || pose_index_[o.keyframe.index] < 0) continue;
-      const auto& m = problem_.measurements[static_cast<std::size_t>(point.first_measurement + index++)];
+      const auto& m = problem_.measurements[static_cast<std::size_t>(index++)];
       if (m.chi2 > kChi2TwoDof) outliers.push_back(o.keyframe);
     }
     bool alive = true;

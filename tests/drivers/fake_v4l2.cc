@@ -48,12 +48,12 @@ class FakeV4l2::System final : public drivers::V4l2System {
   int list_format(v4l2_fmtdesc* entry);
   int list_size(v4l2_frmsizeenum* entry);
   int list_interval(v4l2_frmivalenum* entry);
-  int set_format(v4l2_format* format);
+  int set_format(v4l2_format* wanted);
   int request_buffers(v4l2_requestbuffers* request);
   int queue(const v4l2_buffer& buffer);
   int dequeue(v4l2_buffer* buffer);
   int control(unsigned long request, void* argument);
-  void note(const v4l2_control& control);
+  void note(const v4l2_control& set);
   [[nodiscard]] const CameraFormat* find(std::uint32_t code) const;
   [[nodiscard]] std::size_t buffer_bytes() const { return camera_->set_.sizeimage; }
 
