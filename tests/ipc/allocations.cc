@@ -24,7 +24,8 @@ std::uint64_t allocations() {
 }  // namespace farpoint::test
 
 #if FARPOINT_COUNTS_ALLOCATIONS
-// The program's own malloc goes before glibc's for every library in the process.
+// The program's own functions, by glibc's names, go before glibc's for every library in the process.
+// NOLINTBEGIN(readability-identifier-naming,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
@@ -53,4 +54,5 @@ int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexce
   return *block == nullptr ? ENOMEM : 0;
 }
 }
+// NOLINTEND(readability-identifier-naming,readability-inconsistent-declaration-parameter-name)
 #endif

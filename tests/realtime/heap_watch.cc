@@ -99,7 +99,8 @@ void print_heap_calls() {
 }  // namespace farpoint::test
 
 #if FARPOINT_WATCHES_HEAP
-// The program's own functions go before glibc's for every library in the process.
+// The program's own functions, by glibc's names, go before glibc's for every library in the process.
+// NOLINTBEGIN(readability-identifier-naming,readability-inconsistent-declaration-parameter-name)
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
@@ -141,4 +142,5 @@ void* mmap(void* address, std::size_t length, int protection, int flags, int fd,
   return reinterpret_cast<void*>(syscall(SYS_mmap, address, length, protection, flags, fd, offset));
 }
 }
+// NOLINTEND(readability-identifier-naming,readability-inconsistent-declaration-parameter-name)
 #endif
