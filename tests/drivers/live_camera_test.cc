@@ -70,7 +70,7 @@ TEST_P(LiveCameraTest, ImagesComeOnceInOrderWithTheirContent) {
     ASSERT_TRUE(next());
     EXPECT_EQ(frame_.sequence, i);
     EXPECT_EQ(image_.width_px, 64);
-    EXPECT_TRUE(std::all_of(image_.pixels.begin(), image_.pixels.end(), [i](int p) { return p == int(i); }));
+    EXPECT_TRUE(std::all_of(image_.pixels.begin(), image_.pixels.end(), [i](std::uint8_t p) { return p == i; }));
     EXPECT_EQ(fake_->buffers_queued(), options_.buffers);  // given back at once
   }
   EXPECT_EQ(camera_->counts().frames, 20);
