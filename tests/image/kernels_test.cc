@@ -234,7 +234,8 @@ TEST(Kernels, FastScoreIsTheLargestThresholdThatPasses) {
 TEST(Kernels, MaximaAreNeitherDoubledNorLost) {
   std::mt19937_64 rng(23);
   constexpr int kWidth = 120, kHeight = 40;
-  std::vector<std::vector<std::uint8_t>> score(kHeight, std::vector<std::uint8_t>(kWidth, 0));
+  // Whole vectors are read, past the end of a row.
+  std::vector<std::vector<std::uint8_t>> score(kHeight, std::vector<std::uint8_t>(kWidth + kRowAlignment, 0));
   for (int y = 1; y < kHeight - 1; ++y) {
     for (int x = 1; x < kWidth - 1; ++x) {
       if (rng() % 3 == 0)
