@@ -384,8 +384,9 @@ TEST(Kernels, SampledPatchesAreBitIdenticalAndFollowAPlane) {
   std::array<float, kAlignPatchSide * kAlignPatchSide> noise{}, plane{};
   for (int y = 0; y < kAlignPatchSide; ++y)
     for (int x = 0; x < kAlignPatchSide; ++x) {
-      noise[static_cast<std::size_t>(y * kAlignPatchSide + x)] = uniform(rng, 0, 255);
-      plane[static_cast<std::size_t>(y * kAlignPatchSide + x)] = static_cast<float>(10 + 3 * x - 2 * y);
+      const auto at = static_cast<std::size_t>(y) * kAlignPatchSide + static_cast<std::size_t>(x);
+      noise[at] = uniform(rng, 0, 255);
+      plane[at] = static_cast<float>(10 + 3 * x - 2 * y);
     }
   for (int trial = 0; trial < 50; ++trial) {
     PatchSampling s;
@@ -410,7 +411,8 @@ TEST(Kernels, SampledPatchesAreBitIdenticalAndFollowAPlane) {
     s.share = 1;
     simd_kernels().sample_patch(plane.data(), s, &on_plane);
     for (int at = 0; at < kTemplateCount; ++at) {
-      const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
+      const int column = at % kTemplateSide, row = at / kTemplateSide;
+      const auto i = static_cast<float>(column), j = static_cast<float>(row);
       const float x = s.x0 + s.xi * i + s.xj * j, y = s.y0 + s.yi * i + s.yj * j;
       EXPECT_NEAR(on_plane.value[at], 10 + 3 * x - 2 * y, 1e-3F);
       EXPECT_NEAR(on_plane.dx[at], 3 * s.xi - 2 * s.yi, 1e-4F);

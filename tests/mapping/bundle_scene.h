@@ -136,7 +136,9 @@ class BundleScene {
   [[nodiscard]] bool projects(const BundleProblem::Point& point) const {
     Eigen::Vector2d r;
     for (int i = 0; i < point.measurements; ++i)
-      if (!residual(start, point, start.measurements[static_cast<std::size_t>(point.first_measurement + i)],
+      if (!residual(start, point,
+                    start.measurements[static_cast<std::size_t>(point.first_measurement) +
+                                       static_cast<std::size_t>(i)],
                     &r))
         return false;
     return true;

@@ -66,6 +66,7 @@ TEST(Calibrator, FindsWhatIsWrongWithTheCamera) {
     EXPECT_LT(std::abs(error[i]), 4.0 * sigma[i]) << i;
     EXPECT_LT(std::abs(error[i]), 0.4 * std::abs(truth[i])) << i << ": " << scene.calibrator().delta()[i];
   }
+  EXPECT_FALSE(scene.calibrator().contradicts_given()) << scene.calibrator().surprise();
 }
 
 TEST(Calibrator, LeavesARightCameraAlone) {
@@ -75,13 +76,10 @@ TEST(Calibrator, LeavesARightCameraAlone) {
   for (int i = 0; i < 4; ++i) EXPECT_LT(std::abs(scene.calibrator().delta()[i]), 4.0 * sigma[i]) << i;
 }
 
-TEST(Calibrator, ASmallErrorIsRefinedAndALargeOneContradicts) {
-  CalibratedScene small(CalibrationDelta(0.004, 1.5, -1.0, 0.01), 3);
-  for (int i = 0; i < 8; ++i) small.turn();
-  EXPECT_FALSE(small.calibrator().contradicts_given()) << small.calibrator().surprise();
-  CalibratedScene large(CalibrationDelta(0.1, 0.0, 0.0, 0.0), 3);
-  for (int i = 0; i < 8; ++i) large.turn();
-  EXPECT_TRUE(large.calibrator().contradicts_given()) << large.calibrator().surprise();
+TEST(Calibrator, ALargeErrorContradictsTheGivenCamera) {
+  CalibratedScene scene(CalibrationDelta(0.1, 0.0, 0.0, 0.0), 3);
+  for (int i = 0; i < 8; ++i) scene.turn();
+  EXPECT_TRUE(scene.calibrator().contradicts_given()) << scene.calibrator().surprise();
 }
 
 TEST(Calibrator, AYoungWindowSaysNothing) {

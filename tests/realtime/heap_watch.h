@@ -6,9 +6,8 @@
 
 namespace farpoint::test {
 
-// False where a sanitizer owns the heap: then nothing is counted.
-[[nodiscard]] bool heap_is_watched();
-// Counts from now on, from zero; a thread is told by its name when it first calls.
+// Counts from now on, from zero, where counts_allocations() (tests/ipc/allocations.h); a thread is told by
+// its name when it first calls.
 void watch_heap();
 void stop_watching_heap();
 // malloc, calloc, realloc, aligned allocation, free and mmap by threads of this name while watched.

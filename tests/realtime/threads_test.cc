@@ -9,6 +9,7 @@
 
 #include "daemon/replay.h"
 #include "ipc/log.h"
+#include "tests/ipc/allocations.h"
 #include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 #include "tests/realtime/heap_watch.h"
@@ -53,7 +54,7 @@ ThreadHooks watch_from_settled(bool* watched) {
 
 void expect_no_heap_calls(const std::string& recording, double speed) {
   if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
-  if (!test::heap_is_watched()) GTEST_SKIP() << "a sanitizer owns the heap";
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
   const test::Scratch scratch;
   const std::string log = scratch.path("run.lcm");
   ASSERT_TRUE(test::import_recording(recording, log));
@@ -82,7 +83,7 @@ TEST(RecordedThreads, NoHeapOnEurocAfterSettling) {
 
 TEST(RecordedThreads, APlantedMallocIsFound) {
   if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
-  if (!test::heap_is_watched()) GTEST_SKIP() << "a sanitizer owns the heap";
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
   const test::Scratch scratch;
   const std::string log = scratch.path("run.lcm");
   ASSERT_TRUE(test::import_recording("euroc {}/euroc/MH_01_part", log));

@@ -64,11 +64,12 @@ TEST(RecordedDeterminism, WhatFreshMemoryHoldsDoesNotMatter) {
 // Straight ahead a camera cannot tell its focal length; in the first turn the images do, and from there on no
 // pose may be called valid.
 TEST(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
-  const fs::path original = kData / "kitti" / "sequences" / "03";
+  const fs::path data = kData / "kitti", original = data / "sequences" / "03";
   if (!fs::exists(original)) GTEST_SKIP() << "no recording " << original;
   const Scratch work;
-  const fs::path copy = fs::path(work.path("kitti")) / "sequences" / "03";
+  const fs::path changed = work.path("kitti"), copy = changed / "sequences" / "03";
   fs::create_directories(copy);
+  fs::create_directory_symlink(data / "poses", changed / "poses");
   fs::create_directory_symlink(original / "image_0", copy / "image_0");
   fs::create_symlink(original / "times.txt", copy / "times.txt");
   // A line of calib.txt is a 3x4 projection: its name, then f 0 cx 0 0 f cy 0 0 0 1 0.
@@ -77,14 +78,12 @@ TEST(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
             0);
   const std::string log = work.path("recording.lcm"), out = work.path("out.lcm"),
                     said = work.path("said.txt");
-  ASSERT_EQ(run((kBin / "farpoint").string() + " import kitti " + work.path("kitti") + " 03 -o " + log), 0);
+  ASSERT_EQ(run((kBin / "farpoint").string() + " import kitti " + changed.string() + " 03 -o " + log), 0);
   ASSERT_EQ(
       run((kBin / "farpointd").string() + " --replay " + log + " --lockstep --output " + out + " > " + said),
       0);
   EXPECT_EQ(run("grep -q 'the images contradict the calibration' " + said), 0);
-  const std::string truth = work.path("truth.lcm");
-  ASSERT_TRUE(import_recording("kitti {}/kitti 03", truth));
-  EXPECT_EQ(run((kBin / "farpoint").string() + " evaluate " + out + " --truth " + truth +
+  EXPECT_EQ(run((kBin / "farpoint").string() + " evaluate " + out + " --truth " + log +
                 " --expect 'out.live.share <= 0.4'"),
             0);
 }

@@ -9,8 +9,8 @@
 namespace farpoint::test {
 namespace {
 
-// A drone at 50 to 100 m: all it sees is far, and virtual points are what it is about. Over five seeds of 40
-// s the error was 0.77 to 0.97 of the baseline's.
+// A drone at 50 to 100 m: all it sees is far, and virtual points are what it is about. With five seeds, 40 s
+// each, the error was 0.77 to 0.97 of the baseline's.
 TEST(Worlds, VirtualPointsReachFurtherAndAreNoWorse) {
   const Scratch work;
   const std::string farpoint = (kBin / "farpoint").string(), log = work.path("hover.lcm");

@@ -38,15 +38,20 @@ function(farpoint_library name)
   target_compile_options(${name} PRIVATE ${FARPOINT_WARNINGS})
 endfunction()
 
+# farpoint_test_program(name sources...): a program of tests/, includes and warnings as all of them have.
+function(farpoint_test_program name)
+  add_executable(${name} ${ARGN})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
+  target_compile_options(${name} PRIVATE ${FARPOINT_WARNINGS})
+endfunction()
+
 # farpoint_test(name folder libraries...): one GoogleTest program from tests/<folder>/*.cc, one ctest entry a test.
 function(farpoint_test name folder)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/${folder}/*.cc)
   if(NOT sources)
     return()
   endif()
-  add_executable(${name} ${sources})
-  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR})
-  target_compile_options(${name} PRIVATE ${FARPOINT_WARNINGS})
+  farpoint_test_program(${name} ${sources})
   target_compile_definitions(${name} PRIVATE FARPOINT_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
                              FARPOINT_BINARY_DIR="${CMAKE_BINARY_DIR}")
   target_link_libraries(${name} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
