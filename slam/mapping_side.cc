@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "slam/map/grow.h"
-
 namespace farpoint::slam {
 
 MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange* exchange)
@@ -11,7 +9,7 @@ MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange
 
 void MappingSide::collect_recorded() {
   while (const RecordedFrame* frame = exchange_.recorded.front()) {
-    if (config_.capacity.whole_trajectory) append_in_steps(*frame, &recorded_);
+    if (config_.capacity.whole_trajectory) recorded_.push_back(*frame);
     exchange_.recorded.pop();
   }
 }

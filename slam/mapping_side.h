@@ -2,6 +2,7 @@
 // calls step() is the only writer of the map.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <vector>
 
@@ -32,7 +33,7 @@ class MappingSide {
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
   // Empty without capacity.whole_trajectory.
-  [[nodiscard]] const std::vector<RecordedFrame>& recorded() const { return recorded_; }
+  [[nodiscard]] const std::deque<RecordedFrame>& recorded() const { return recorded_; }
   // Of the tracker that poses frames afterwards.
   [[nodiscard]] std::size_t tracker_bytes() const { return poser_.bytes(); }
 
@@ -46,7 +47,7 @@ class MappingSide {
   Exchange& exchange_;
   Mapper mapper_;
   Tracker poser_;
-  std::vector<RecordedFrame> recorded_;
+  std::deque<RecordedFrame> recorded_;  // grows to the run's end, hence never copied
   MappingReply* reply_ = nullptr;
   StageListener* listener_ = nullptr;
   std::uint64_t replies_ = 0;

@@ -5,6 +5,13 @@
 
 namespace farpoint::slam {
 
+namespace {
+
+// Arrays of a thinned keyframe come in multiples of this, so that what one leaves fits another.
+constexpr std::size_t kThinStep = 128;
+
+}  // namespace
+
 Map::Map(const CapacityConfig& capacity, const Rig& rig)
     : capacity_(capacity),
       rig_(rig),
@@ -58,8 +65,24 @@ void Map::remove_keyframe(KeyframeHandle handle) {
   for (const Covisible& c : keyframe.covisible)
     if (Keyframe* other = keyframes_.get(c.keyframe))
       std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
+  if (keyframe.image) keep_room_of(&keyframe);
   keyframe = Keyframe{};
   keyframes_.release(handle);
+}
+
+Keyframe Map::roomy_keyframe() {
+  if (rooms_.empty()) return {};
+  Keyframe keyframe = std::move(rooms_.back());
+  rooms_.pop_back();
+  return keyframe;
+}
+
+void Map::keep_room_of(Keyframe* keyframe) {
+  Keyframe& room = rooms_.emplace_back();
+  room.set = std::move(keyframe->set);
+  room.landmarks = std::move(keyframe->landmarks);
+  room.bearings = std::move(keyframe->bearings);
+  room.grid = std::move(keyframe->grid);
 }
 
 void Map::thin_keyframe(KeyframeHandle handle) {
@@ -70,8 +93,9 @@ void Map::thin_keyframe(KeyframeHandle handle) {
   std::vector<LandmarkHandle> landmarks;
   const auto used = static_cast<std::size_t>(
       std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
-  features.reserve(used);
-  landmarks.reserve(used);
+  const std::size_t room = (used + kThinStep - 1) / kThinStep * kThinStep;
+  features.reserve(room);
+  landmarks.reserve(room);
   for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
     Landmark* l = landmarks_.get(k.landmarks[i]);
     if (l == nullptr) continue;
@@ -80,10 +104,9 @@ void Map::thin_keyframe(KeyframeHandle handle) {
     features.push_back(k.set.features[i]);
     landmarks.push_back(k.landmarks[i]);
   }
+  keep_room_of(&k);
   k.set = {std::move(features), {}};
   k.landmarks = std::move(landmarks);
-  k.bearings = {};
-  k.grid = FeatureGrid();
 }
 
 LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
@@ -161,7 +184,8 @@ void Map::remove_landmark(LandmarkHandle handle) {
   Landmark* l = landmarks_.get(handle);
   if (l == nullptr) return;
   for (const Observation& o : l->observations) detach_feature(o);
-  l->observations = {};  // a slot must not keep what its best-seen landmark once needed
+  // A slot must not keep what its best-seen landmark once needed, as with "= {}" it would.
+  std::vector<Observation>().swap(l->observations);
   landmarks_.release(handle);
 }
 

@@ -18,10 +18,13 @@ class Map {
  public:
   Map(const CapacityConfig& capacity, const Rig& rig);
 
-  // --- keyframes
-  // ----------------------------------------------------------------------------------------------- Null when
-  // full: the caller makes room first (remove_keyframe).
+  // Keyframes.
+
+  // Null when full: the caller makes room first (remove_keyframe).
   [[nodiscard]] KeyframeHandle add_keyframe(Keyframe&& keyframe);
+  // To be filled and added: its arrays, whose contents mean nothing, have the room of one that let go of its
+  // pixels. Without it they would leave holes in the heap, which a long run fills ever worse.
+  [[nodiscard]] Keyframe roomy_keyframe();
   // Re-hosts what it hosts, detaches its observations, remembers its pose in the skeleton relative to its
   // most covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
   void remove_keyframe(KeyframeHandle handle);
@@ -30,10 +33,10 @@ class Map {
   // new can be matched with the keyframe afterwards.
   void thin_keyframe(KeyframeHandle handle);
 
-  // --- landmarks
-  // ----------------------------------------------------------------------------------------------- A new
-  // landmark of state bearing hosted by (keyframe, feature), with that one observation. Null when full or
-  // when no patch can be cut around the feature.
+  // Landmarks.
+
+  // A new landmark of state bearing hosted by (keyframe, feature), with that one observation. Null when full
+  // or when no patch can be cut around the feature.
   [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, std::size_t feature);
   void remove_landmark(LandmarkHandle handle);
   // False where the keyframe already sees the landmark, has no such feature, or the feature belongs to
@@ -57,21 +60,15 @@ class Map {
   // Angle between the host's ray and the observer's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 
-  // --- calibration
-  // --------------------------------------------------------------------------------------------- Uses a
-  // refined calibration from now on: the bearings of landmarks, and of keyframes that still have pixels, are
-  // made anew; poses and inverse depths stay.
+  // Uses a refined calibration from now on: the bearings of landmarks, and of keyframes that still have
+  // pixels, are made anew; poses and inverse depths stay.
   void set_camera(int index, const Camera& camera);
 
-  // --- covisibility
-  // -------------------------------------------------------------------------------------------- Counts again
-  // which keyframes share landmarks with this one, both ways.
+  // Counts again which keyframes share landmarks with this one, both ways.
   void update_covisibility(KeyframeHandle handle);
 
-  // --- the way home
-  // -------------------------------------------------------------------------------------------- Pose of any
-  // keyframe ever made in a living map by its id, also of removed ones (without capacity.whole_trajectory
-  // only those of late); false where it is unknown.
+  // Pose of any keyframe ever made in a living map by its id, also of removed ones (without
+  // capacity.whole_trajectory only those of late); false where it is unknown.
   [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const;
 
   // Everything of one map goes (a map that never came to life).
@@ -93,6 +90,7 @@ class Map {
   };
 
   void add_to_skeleton(KeyframeHandle keyframe);
+  void keep_room_of(Keyframe* keyframe);
   // Null where the skeleton no longer reaches back so far.
   [[nodiscard]] const SkeletonNode* skeleton_node(std::uint64_t keyframe_id) const;
   bool set_bearing(Landmark* landmark) const;
@@ -109,6 +107,7 @@ class Map {
   std::uint64_t first_in_skeleton_ = 1;
   std::uint64_t next_keyframe_id_ = 1;
   std::uint64_t next_landmark_id_ = 1;
+  std::vector<Keyframe> rooms_;    // for roomy_keyframe: no more than had pixels at once
   std::vector<int> shared_count_;  // scratch of update_covisibility, one a keyframe slot
 };
 

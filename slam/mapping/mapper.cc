@@ -69,7 +69,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
 }
 
 KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id) {
-  Keyframe k;
+  Keyframe k = map_.roomy_keyframe();
   k.map_id = map_id;
   k.utime = frame.utime;
   k.frame_number = frame.number;
@@ -79,6 +79,7 @@ KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body
   k.grid = frame.grid;
   k.image = frame.image;
   const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(frame.camera)].camera;
+  k.bearings.clear();
   k.bearings.reserve(k.set.features.size());
   for (const Feature& f : k.set.features) {
     Eigen::Vector3d b = Eigen::Vector3d::UnitZ();
