@@ -13,6 +13,7 @@ namespace farpoint::slam {
 struct Covisible {
   KeyframeHandle keyframe;
   int shared = 0;  // landmarks seen by both
+  int wide = 0;    // of these, seen under an angle that shows translation
 };
 
 struct Keyframe {
@@ -30,8 +31,10 @@ struct Keyframe {
   FeatureGrid grid;
   std::shared_ptr<const FrameImage> image;  // pixels for alignment
 
-  std::vector<Covisible> covisible;  // most shared first, then newest first
-  std::uint64_t optimised = 0;       // times local BA moved it
+  // Most wide ones first: keyframes that share only what is far say little about each other's place. Then
+  // most shared, then newest.
+  std::vector<Covisible> covisible;
+  std::uint64_t optimised = 0;  // times local BA moved it
 };
 
 }  // namespace farpoint::slam

@@ -12,12 +12,13 @@ constexpr std::size_t kThinStep = 128;
 
 }  // namespace
 
-Map::Map(const CapacityConfig& capacity, const Rig& rig)
+Map::Map(const CapacityConfig& capacity, const Rig& rig, double wide_parallax_rad)
     : capacity_(capacity),
       rig_(rig),
+      wide_parallax_rad_(wide_parallax_rad),
       keyframes_(static_cast<std::size_t>(capacity.keyframes)),
       landmarks_(static_cast<std::size_t>(capacity.landmarks)),
-      shared_count_(static_cast<std::size_t>(capacity.keyframes), 0) {}
+      shared_(static_cast<std::size_t>(capacity.keyframes)) {}
 
 KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   const KeyframeHandle handle = keyframes_.allocate();
@@ -303,25 +304,30 @@ double Map::parallax(const Landmark& l, const Observation& o) const {
 
 void Map::update_covisibility(KeyframeHandle handle) {
   Keyframe& keyframe = keyframes_[handle];
-  std::fill(shared_count_.begin(), shared_count_.end(), 0);
+  std::fill(shared_.begin(), shared_.end(), Shared{});
   for (const LandmarkHandle& lh : keyframe.landmarks) {
     const Landmark* l = landmarks_.get(lh);
     if (l == nullptr || l->state == LandmarkState::kBearing) continue;
-    for (const Observation& o : l->observations) ++shared_count_[o.keyframe.index];
+    const int wide = l->max_parallax_rad >= wide_parallax_rad_ ? 1 : 0;
+    for (const Observation& o : l->observations) {
+      ++shared_[o.keyframe.index].all;
+      shared_[o.keyframe.index].wide += wide;
+    }
   }
   for (const Covisible& c : keyframe.covisible)
     if (Keyframe* other = keyframes_.get(c.keyframe))
       std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
   const auto stronger = [this](const Covisible& a, const Covisible& b) {
+    if (a.wide != b.wide) return a.wide > b.wide;
     if (a.shared != b.shared) return a.shared > b.shared;
     return keyframes_[a.keyframe].id > keyframes_[b.keyframe].id;
   };
   keyframe.covisible.clear();
   keyframes_.for_each([&](KeyframeHandle h, Keyframe& other) {
-    const int shared = shared_count_[h.index];
-    if (h == handle || shared == 0) return;
-    keyframe.covisible.push_back({h, shared});
-    const Covisible back{handle, shared};
+    const Shared& shared = shared_[h.index];
+    if (h == handle || shared.all == 0) return;
+    keyframe.covisible.push_back({h, shared.all, shared.wide});
+    const Covisible back{handle, shared.all, shared.wide};
     other.covisible.insert(std::lower_bound(other.covisible.begin(), other.covisible.end(), back, stronger),
                            back);
   });

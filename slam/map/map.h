@@ -16,7 +16,8 @@ namespace farpoint::slam {
 
 class Map {
  public:
-  Map(const CapacityConfig& capacity, const Rig& rig);
+  // wide_parallax_rad: from this angle between two sightings on, a landmark shows translation.
+  Map(const CapacityConfig& capacity, const Rig& rig, double wide_parallax_rad = 0.0);
 
   // Keyframes.
 
@@ -99,16 +100,21 @@ class Map {
   void note_parallax(const Observation& observation, Landmark* landmark) const;
   void thin_observations(Landmark& landmark, LandmarkHandle handle);
 
+  struct Shared {
+    int all = 0, wide = 0;
+  };
+
   CapacityConfig capacity_;
   Rig rig_;
+  double wide_parallax_rad_;
   Pool<Keyframe> keyframes_;
   Pool<Landmark> landmarks_;
   std::deque<SkeletonNode> skeleton_;  // by keyframe id, from first_in_skeleton_ on
   std::uint64_t first_in_skeleton_ = 1;
   std::uint64_t next_keyframe_id_ = 1;
   std::uint64_t next_landmark_id_ = 1;
-  std::vector<Keyframe> rooms_;    // for roomy_keyframe: no more than had pixels at once
-  std::vector<int> shared_count_;  // scratch of update_covisibility, one a keyframe slot
+  std::vector<Keyframe> rooms_;  // for roomy_keyframe: no more than had pixels at once
+  std::vector<Shared> shared_;   // scratch of update_covisibility, one a keyframe slot
 };
 
 }  // namespace farpoint::slam

@@ -60,7 +60,7 @@ std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
-      map_(config.capacity, rig),
+      map_(config.capacity, rig, config.landmarks.promote_parallax_rad),
       views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
       calibrator_(config.calibration, rig.cameras.front().camera),
