@@ -95,6 +95,7 @@ struct RealtimeConfig {
   int capture_queue = 2;  // images that may wait for tracking
   SchedulingPolicy policy = SchedulingPolicy::kFifo;
   ThreadConfig capture, tracking, output, mapping;
+  double deadline_ms = 0;   // mid-exposure to output; 0: live a frame period, in replay none
   int cpu_latency_us = -1;  // live; -1: as the system likes
   bool require = false;     // leave where the system refuses
 };

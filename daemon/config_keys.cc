@@ -135,6 +135,7 @@ std::vector<ConfigKey> make_keys() {
       integer("realtime.output_core", "", -1, 1023, FIELD(realtime.output.core)),
       integer("realtime.mapping_priority", "", 0, 90, FIELD(realtime.mapping.priority)),
       integer("realtime.mapping_core", "", -1, 1023, FIELD(realtime.mapping.core)),
+      number("realtime.deadline_ms", "ms", 0, 100000, FIELD(realtime.deadline_ms)),
       integer("realtime.cpu_latency_us", "us", -1, 1000000, FIELD(realtime.cpu_latency_us)),
       boolean("realtime.require", FIELD(realtime.require)),
 

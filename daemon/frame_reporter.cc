@@ -20,6 +20,7 @@ FrameReporter::FrameReporter(const Config& config, const Names& names, std::vect
                              bool with_schedule)
     : status_rate_hz_(config.lcm.status_rate_hz),
       assumed_scale_(config.scale.assumed),
+      deadline_ms_(config.realtime.deadline_ms),
       with_schedule_(with_schedule),
       sinks_(std::move(sinks)),
       publisher_(publisher),
@@ -43,6 +44,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     if (package->due_s > 0.0) frame_.age_at_s = package->due_s + 1e-6 * static_cast<double>(frame_.age_us);
     ++status_.frames_tracked;
     if (frame_.valid) ++status_.frames_valid;
+    if (is_late(frame_.age_us, deadline_ms_)) ++status_.deadlines_missed;
     for (PoseSink* sink : sinks_) sink->on_frame(frame_);
     publisher_->on_frame(frame_);
     publish_status(*package, out);
@@ -53,8 +55,9 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   silence_.counts = package->counts;
   silence_.chance = package->chance;
   if (publisher_->has_sinks()) {
-    publisher_->publish(ipc::kTimingChannel, result.utime,
-                        package->clock.message(result.utime, result.sequence, package->chance.age_us));
+    publisher_->publish(
+        ipc::kTimingChannel, result.utime,
+        package->clock.message(result.utime, result.sequence, package->chance.age_us, deadline_ms_));
   }
   return frame_;
 }

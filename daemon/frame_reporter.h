@@ -30,6 +30,8 @@ class FrameReporter {
   // age_us: since the last frame.
   const FrameOutput& report_silence(std::int64_t utime, std::int64_t age_us, const InputCounts& in,
                                     const OutputCounts& out);
+  // Before the first frame. See realtime.deadline_ms.
+  void set_deadline(double deadline_ms) { deadline_ms_ = deadline_ms; }
   // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.
   void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
   // Any thread.
@@ -44,6 +46,7 @@ class FrameReporter {
 
   std::atomic<double> status_rate_hz_;
   const double assumed_scale_;
+  double deadline_ms_;
   const bool with_schedule_;
   std::vector<PoseSink*> sinks_;
   Publisher* publisher_;

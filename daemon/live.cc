@@ -141,7 +141,9 @@ std::unique_ptr<Session> LiveRun::open_session() {
                value_text(config_, "camera.driver"), config_.camera.device);
   // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
   config_.estimator.capacity.whole_trajectory = wants_results();
-  return make_session(config_, calibration_, &outputs_, !options_.output.empty());
+  std::unique_ptr<Session> session = make_session(config_, calibration_, &outputs_, !options_.output.empty());
+  if (config_.realtime.deadline_ms == 0.0) session->reporter().set_deadline(1e3 / config_.camera.rate_hz);
+  return session;
 }
 
 void LiveRun::open_control() {

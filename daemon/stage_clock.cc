@@ -113,14 +113,20 @@ void StageClock::forget(int stage) {
   wall_ms_.at(static_cast<std::size_t>(stage)) = -1.0;
 }
 
-timing_t StageClock::message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us) const {
+bool is_late(std::int64_t age_us, double deadline_ms) {
+  return deadline_ms > 0.0 && 1e-3 * static_cast<double>(age_us) > deadline_ms;
+}
+
+timing_t StageClock::message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us,
+                             double deadline_ms) const {
   timing_t m{};
   m.utime = utime;
   m.sequence = sequence;
   std::copy(cpu_ms_.begin(), cpu_ms_.end(), m.cpu_ms);
   std::copy(wall_ms_.begin(), wall_ms_.end(), m.wall_ms);
   m.latency_ms = age_us > 0 ? 1e-3 * static_cast<double>(age_us) : -1.0;
-  m.deadline_ms = 0.0;
+  m.deadline_ms = deadline_ms;
+  m.deadline_missed = is_late(age_us, deadline_ms) ? 1 : 0;
   m.process_cpu_s = process_cpu_s();
   m.resident_bytes = resident_bytes();
   m.peak_resident_bytes = peak_resident_bytes();

@@ -21,6 +21,9 @@ namespace farpoint::daemon {
 [[nodiscard]] std::int64_t resident_bytes();
 [[nodiscard]] std::int64_t peak_resident_bytes();
 
+// deadline_ms: 0 for none.
+[[nodiscard]] bool is_late(std::int64_t age_us, double deadline_ms);
+
 // Adds up what each stage of one frame took. A stage may run several times; stages may nest. Listens to an
 // estimator's stages.
 class StageClock final : public slam::StageListener {
@@ -48,8 +51,10 @@ class StageClock final : public slam::StageListener {
     cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms;
     wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms;
   }
-  // age_us: from when the frame was due to its output; 0 where there is no common clock.
-  [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us) const;
+  // age_us: from when the frame was due to its output; 0 where there is no common clock. deadline_ms: 0 for
+  // none.
+  [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us,
+                                 double deadline_ms) const;
 
  private:
   std::array<double, kStages> cpu_ms_{}, wall_ms_{}, cpu_began_s_{}, wall_began_s_{};

@@ -133,6 +133,34 @@ TEST_F(Live, StopsInOrderWithinASecond) {
   EXPECT_LT(last_seen_.age_us, 1'000'000);
 }
 
+TEST_F(Live, FramesPastTheirDeadlineAreMarkedAndCounted) {
+  options_.output = scratch_.path("out.lcm");
+  config_.realtime.deadline_ms = 0.001;  // nobody keeps that
+  config_.lcm.status_rate_hz = 100;      // with every frame
+  ASSERT_EQ(run([this] { return frames_ >= 10; }), 0);
+  for (const auto& m : test::messages_of<timing_t>(options_.output, ipc::kTimingChannel)) {
+    EXPECT_EQ(m.deadline_ms, 0.001);
+    EXPECT_TRUE(m.deadline_missed);
+  }
+  const auto status = test::messages_of<status_t>(options_.output, ipc::kStatusChannel);
+  ASSERT_GE(status.size(), 10U);
+  EXPECT_EQ(status.back().deadlines_missed, status.back().frames_tracked);
+}
+
+TEST_F(Live, WithoutAnotherLimitTheDeadlineIsAFramePeriod) {
+  options_.output = scratch_.path("out.lcm");
+  config_.camera.rate_hz = 0.1;  // that anybody keeps
+  config_.lcm.status_rate_hz = 100;
+  ASSERT_EQ(run([this] { return frames_ >= 10; }), 0);
+  const auto timing = test::messages_of<timing_t>(options_.output, ipc::kTimingChannel);
+  ASSERT_GE(timing.size(), 10U);
+  EXPECT_EQ(timing.back().deadline_ms, 10'000.0);
+  for (const timing_t& m : timing) EXPECT_FALSE(m.deadline_missed);
+  const auto status = test::messages_of<status_t>(options_.output, ipc::kStatusChannel);
+  ASSERT_FALSE(status.empty());
+  EXPECT_EQ(status.back().deadlines_missed, 0);
+}
+
 TEST_F(Live, WhatWasRecordedReplaysToTheSamePoses) {
   options_.record = scratch_.path("run.lcm");
   options_.output = scratch_.path("out.lcm");

@@ -34,6 +34,7 @@ struct Fault {
 };
 const std::array kFaults = {Fault{"frames dropped", &status_t::frames_dropped},
                             Fault{"keyframes dropped", &status_t::keyframes_dropped},
+                            Fault{"deadlines missed", &status_t::deadlines_missed},
                             Fault{"wrong size", &status_t::images_wrong_size},
                             Fault{"undecodable images", &status_t::images_undecodable},
                             Fault{"time backwards", &status_t::times_backwards},

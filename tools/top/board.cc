@@ -146,8 +146,8 @@ std::string Board::count_lines() const {
       "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
       s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
       s.camera_losses);
-  text += fmt::format("frames    {} tracked   {} valid   {} keyframes not made\n", s.frames_tracked,
-                      s.frames_valid, s.keyframes_dropped);
+  text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
+                      s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
   text += fmt::format("map       {} keyframes   {} landmarks   {} virtual points\n", s.keyframes, s.landmarks,
                       s.vmps);
   text += fmt::format("CAN       {}   {} not sent   {} bus-offs   {} received\n", can_state_name(s.can_state),
