@@ -97,14 +97,13 @@ stop_daemon() {
 
 loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
 
-# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`, and is silent after `hold`.
+# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
 start_playing() {
   rm -f /tmp/go
   /tmp/play /dev/video10 320x240 10 "$1" /tmp/go /tmp/frames.grey ${2:+"$2"} > /tmp/played &
   player=$!
 }
 go() { touch /tmp/go; }
-hold() { rm /tmp/go; }
 
 # A USB camera that plays the same frames, at 10 Hz.
 plug_in() {

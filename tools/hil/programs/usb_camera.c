@@ -3,7 +3,8 @@
 // Emulates a USB video class camera on the kernel's virtual host controller (vhci-hcd, USB/IP), so that the
 // kernel's own uvcvideo makes the device. Sends the raw grey frames of the file over a bulk end point,
 // forwards and backwards in turn, and prints "NUMBER INDEX_IN_FILE MONOTONIC_US" when one begins to be sent.
-// SIGUSR1 makes it fall silent, without an error, until the next. Its end, also by a signal, is an unplugging.
+// SIGUSR1 makes it fall silent, without an error, until the next. Its end, also by a signal, is an
+// unplugging.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>
