@@ -78,10 +78,11 @@ ${5:-}
 YAML
 }
 
+daemon_command=(/tmp/farpointd)
 # start_daemon ARGUMENT...: live, without LCM's network unless it is asked for.
 start_daemon() {
   write_configuration /tmp/farpoint.yaml
-  /tmp/farpointd --config /tmp/farpoint.yaml --set lcm.enabled=false "$@" > $daemon_log 2>&1 &
+  "${daemon_command[@]}" --config /tmp/farpoint.yaml --set lcm.enabled=false "$@" > $daemon_log 2>&1 &
   daemon=$!
   wait_until 30 "the daemon's start" says "live from"
 }
@@ -96,20 +97,45 @@ stop_daemon() {
 
 loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
 
-# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`, and is silent after `hold`.
+# start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
 start_playing() {
   rm -f /tmp/go
   /tmp/play /dev/video10 320x240 10 "$1" /tmp/go /tmp/frames.grey ${2:+"$2"} > /tmp/played &
   player=$!
 }
 go() { touch /tmp/go; }
-hold() { rm /tmp/go; }
+
+# A USB camera that plays the same frames, at 10 Hz.
+plug_in() {
+  /tmp/usb_camera 320x240 10 /tmp/frames.grey >> /tmp/played &
+  camera=$!
+}
+unplug() {
+  kill $camera
+  wait $camera
+}
+
+# libcamera learns of cameras from udev, and farpointd loads its module from beside its own folder.
+prepare_libcamera() {
+  mkdir -p /tmp/installed/bin
+  cp /tmp/farpointd /tmp/installed/bin/ && cp -r "$root/lib" /tmp/installed/ || fail "no libcamera module"
+  daemon_command=(/tmp/installed/bin/farpointd)
+  /lib/systemd/systemd-udevd > /tmp/udevd.log 2>&1 &
+  wait_until 10 "udev" udevadm control --ping
+  udevadm trigger --action=add
+  udevadm settle
+}
 
 # --- the installed package, in a machine that systemd runs
 
 main_pid() { systemctl show -p MainPID --value farpointd; }
-# has_other_pid PID: the service runs, as another process.
-has_other_pid() { [ "$(main_pid)" != "$1" ] && [ "$(main_pid)" != 0 ] && systemctl -q is-active farpointd; }
+# is_started_anew PID: the service has another process. has_other_pid PID: and that has said that it is ready.
+is_started_anew() {
+  local now
+  now=$(main_pid)
+  [ "$now" != "$1" ] && [ "$now" != 0 ]
+}
+has_other_pid() { is_started_anew "$1" && systemctl -q is-active farpointd; }
 journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
 # service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
 service_tracks() {

@@ -1,10 +1,12 @@
 """The virtual machine."""
 
 import pathlib
+import shutil
 import subprocess
 
 from host import material
 
+QEMU = "qemu-system-x86_64"
 # The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest
 # sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
 # first.
@@ -14,16 +16,18 @@ SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
 def guest(here, packages):
     """The folder of the guest, which is built where it is not there."""
+    if shutil.which(QEMU) is None:
+        raise material.NotMade(f"no {QEMU} here, expected it installed: tools/deps --hil")
     done = subprocess.run([here / "guest/build", *packages], stdout=subprocess.PIPE, text=True)
     if done.returncode != 0:
-        raise material.NotMade("the guest could not be built")
+        raise material.NotMade("the guest could not be built; it needs root and Debian's archive once")
     return pathlib.Path(done.stdout.strip())
 
 
 def command(guest_folder, kind, devices, folder):
     kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
     kernel_line += SYSTEMD if kind == "systemd" else ""
-    return ["qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
+    return [QEMU, "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
             "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
             "-serial", "stdio", "-monitor", "none", "-no-reboot",
             "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,

@@ -8,6 +8,7 @@ import tempfile
 from host import lcm_log
 
 PROGRAMS = ("farpointd", "farpoint")
+MODULES = "lib/farpoint"  # what farpointd loads, beside bin/
 # Slow motion between walls: seen by a small image with few features, which is all that the guest can track live.
 SEQUENCE = ["simulate", "yard", "--size", "320x240", "--duration", "9"]
 FIRST, FRAMES = 80, 100  # where the vehicle has begun to move
@@ -44,8 +45,11 @@ class Stock:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _compile(self):
+        compiler = ("cc", "-O2", "-Wall", "-Wextra", "-Werror")
         for source in sorted((self.here / "programs").glob("*.c")):
-            run("cc", "-O2", "-Wall", "-Wextra", "-Werror", "-static", "-o", self.folder / source.stem, source)
+            run(*compiler, "-static", "-o", self.folder / source.stem, source)
+        for source in sorted((self.here / "preloads").glob("*.c")):
+            run(*compiler, "-shared", "-fPIC", "-o", self.folder / f"{source.stem}.so", source)
 
     def _simulate(self):
         log = self.folder / "sequence.lcm"
@@ -63,7 +67,8 @@ class Stock:
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / "debian").mkdir()
             (pathlib.Path(folder) / "debian/control").write_text("Source: farpoint\nPackage: farpoint\n")
-            text = run("dpkg-shlibdeps", "-O", *[self.build / "bin" / p for p in PROGRAMS], cwd=folder)
+            binaries = [self.build / "bin" / p for p in PROGRAMS] + sorted((self.build / MODULES).glob("*.so"))
+            text = run("dpkg-shlibdeps", "-O", *binaries, cwd=folder)
         alternatives = text.strip().split("=", 1)[1].split(",")
         return [alternative.split("|")[0].split("(")[0].strip() for alternative in alternatives]
 
@@ -76,6 +81,11 @@ class Stock:
             made = list(self.folder.glob("package/*.deb"))
         return made[0]
 
+    def _lay_out_modules(self, folder):
+        if not (self.build / MODULES / "farpoint_libcamera.so").exists():
+            raise NotMade(f"{self.build}: built without libcamera, expected it built with libcamera-dev (tools/deps)")
+        shutil.copytree(self.build / MODULES, folder / MODULES)
+
     def lay_out(self, several, folder, broken):
         """What a machine is given that runs these scenarios; each has a folder of its own for what it leaves."""
         for program in PROGRAMS:
@@ -86,6 +96,8 @@ class Stock:
         shutil.copy(self.here / "run_scenarios.sh", folder / "scenario")
         if any(one.needs == "package" for one in several):
             shutil.copy(self.package(), folder / "farpoint.deb")
+        if any(one.needs == "libcamera" for one in several):
+            self._lay_out_modules(folder)
         support = (self.here / "support.sh").read_text()
         for one in several:
             (folder / one.name).mkdir()

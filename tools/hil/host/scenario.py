@@ -4,7 +4,7 @@
     #@ form: short                    or long
     #@ machine: systemd               else in a machine without it
     #@ devices: -device ...           further devices of the machine
-    #@ needs: package                 the .deb is laid beside it
+    #@ needs: package                 the .deb is laid beside it; libcamera: the module that farpointd loads
     #@ check: NAME ARGUMENT...        of checks.py, on what it left; any number
     #@ broken: what is left out or inverted where $BROKEN is set
     #@ broken_says: the complaint that must follow, a regular expression

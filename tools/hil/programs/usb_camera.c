@@ -3,7 +3,8 @@
 // Emulates a USB video class camera on the kernel's virtual host controller (vhci-hcd, USB/IP), so that the
 // kernel's own uvcvideo makes the device. Sends the raw grey frames of the file over a bulk end point,
 // forwards and backwards in turn, and prints "NUMBER INDEX_IN_FILE MONOTONIC_US" when one begins to be sent.
-// Its end, also by a signal, is an unplugging.
+// SIGUSR1 makes it fall silent, without an error, until the next. Its end, also by a signal, is an
+// unplugging.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -48,10 +49,12 @@ struct camera {
   int64_t next_us;
 };
 
-static volatile sig_atomic_t stopped;
+static volatile sig_atomic_t stopped, silent;
 static void on_signal(int number) {
-  (void)number;
-  stopped = 1;
+  if (number == SIGUSR1)
+    silent = !silent;
+  else
+    stopped = 1;
 }
 
 static int64_t now_us(void) {
@@ -261,7 +264,7 @@ static long index_in_file(const struct camera* c) {
 }
 
 static void begin_frame_if_due(struct camera* c) {
-  if (!c->streaming || c->at >= 0 || c->pendings == 0 || now_us() < c->next_us) return;
+  if (silent || !c->streaming || c->at >= 0 || c->pendings == 0 || now_us() < c->next_us) return;
   const int64_t period_us = c->interval_100ns / 10;
   c->next_us = c->next_us + period_us > now_us() ? c->next_us + period_us : now_us() + period_us;
   c->at = 0;
@@ -339,6 +342,7 @@ int main(int argc, char** argv) {
   c.count = status.st_size / (long)frame_bytes(&c);
   signal(SIGTERM, on_signal);
   signal(SIGINT, on_signal);
+  signal(SIGUSR1, on_signal);
   signal(SIGPIPE, SIG_IGN);
   describe(&c);
   if (!plug_in(&c)) {

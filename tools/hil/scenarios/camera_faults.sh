@@ -1,5 +1,5 @@
 # vivid: 30 % dropped buffers, buffers flagged as damaged, a fatal streaming error, a disconnected device.
-#@ form: short
+#@ form: long
 #@ check: status out.lcm images_missing=10..60 images_flagged=5..5 camera_losses=2..2 frames_tracked=80..200
 #@ check: status out.lcm frames_dropped=0..0 times_backwards=0..0
 #@ broken: no buffer is dropped

@@ -1,5 +1,5 @@
 # The bus's interface goes down, away, and its queue fills up: the frames come again by themselves, none of them stale.
-#@ form: short
+#@ form: long
 #@ check: bus after_down.log played 50
 #@ check: bus after_away.log played 50
 #@ check: bus after_full.log played 50

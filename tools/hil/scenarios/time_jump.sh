@@ -1,5 +1,5 @@
 # The system's time jumps an hour forwards and back: images keep their times, tracking goes on.
-#@ form: short
+#@ form: long
 #@ check: images run.lcm played
 #@ check: lockstep run.lcm played 30
 #@ check: status out.lcm frames_dropped=0..0 times_backwards=0..0 camera_losses=0..0

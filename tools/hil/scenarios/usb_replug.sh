@@ -1,14 +1,10 @@
 # A USB camera of the kernel's uvcvideo, chosen by its port, is unplugged and plugged in again ten times while tracking.
-#@ form: short
+#@ form: long
 #@ check: images run.lcm played 20000 10
 #@ check: status out.lcm camera_losses=10..10 frames_dropped=0..0 times_backwards=0..0
 #@ broken: it is not plugged in again
 #@ broken_says: ^stream after unplugging 1: not within
 modprobe -a vhci-hcd uvcvideo || fail "no USB cameras"
-plug_in() {
-  /tmp/usb_camera 320x240 10 /tmp/frames.grey >> /tmp/played &
-  camera=$!
-}
 plug_in
 wait_until 20 "the USB camera's node" test -e /dev/video0
 port=$(readlink -f /sys/class/video4linux/video0/device)  # .../usb3/3-1/3-1:1.0
@@ -17,8 +13,7 @@ start_daemon --set camera.device="usb:$port" --record /tmp/run.lcm --output /tmp
 wait_until 20 "the stream" said_times "streams GREY" 1
 sleep 3
 for n in 1 2 3 4 5 6 7 8 9 10; do
-  kill $camera
-  wait $camera
+  unplug
   wait_until 5 "unplugging $n is noticed" said_times "lost:" "$n"
   from=$(seconds)
   [ -n "$BROKEN" ] || plug_in
@@ -27,8 +22,7 @@ for n in 1 2 3 4 5 6 7 8 9 10; do
   sleep 1
 done
 stop_daemon
-kill $camera
-wait $camera
+unplug
 [ "$(said "relocalising -> tracking")" -ge 10 ] || fail "tracked again $(said "relocalising -> tracking") times of 10"
 cp -t "$left" /tmp/run.lcm /tmp/out.lcm /tmp/played
 times=$(tr ' ' '\n' <<< "${times# }" | sort -n)
