@@ -1,6 +1,7 @@
 #include "slam/mapping_side.h"
 
 #include <algorithm>
+#include <ranges>
 
 namespace farpoint::slam {
 
@@ -102,8 +103,8 @@ void MappingSide::pose_frames(const MappingJob& job) {
   // The pair's second frame was recorded next, and stands at the second keyframe.
   if (const auto second = std::next(first); second != recorded_.end())
     (void)mapper_.map().pose_of(second->reference_id, &prior);
-  for (auto f = frames.rbegin(); f != frames.rend(); ++f)
-    if ((*f)->number > job.last_before_map) (void)pose_frame(job, **f, &prior, &posed);
+  for (const Frame* f : std::ranges::reverse_view(frames))
+    if (f->number > job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
   poser_.adopt(nullptr, {});
   recorded_.insert(recorded_.end(), posed.begin(), posed.end());
 }

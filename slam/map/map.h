@@ -42,16 +42,16 @@ class Map {
   void remove_landmark(LandmarkHandle handle);
   // False where the keyframe already sees the landmark, has no such feature, or the feature belongs to
   // another one.
-  bool add_observation(LandmarkHandle landmark, const Observation& observation);
+  bool add_observation(LandmarkHandle handle, const Observation& observation);
   // Removes the sighting by `keyframe`; re-hosts where it was the host's. The landmark goes when fewer than
   // two are left. True while the landmark lives.
-  bool remove_observation(LandmarkHandle landmark, KeyframeHandle keyframe);
+  bool remove_observation(LandmarkHandle handle, KeyframeHandle keyframe);
   // Moves the observations of `from` to `into` where they do not collide, then removes `from`.
   void fuse(LandmarkHandle into, LandmarkHandle from);
   // Attaches the anchor to another observing keyframe; bearing, depth and patch stay as they are. Does
   // nothing where new_host does not see the landmark: a host must be an observer, or the landmark would not
   // hear of its removal.
-  void rehost(LandmarkHandle landmark, KeyframeHandle new_host);
+  void rehost(LandmarkHandle handle, KeyframeHandle new_host);
 
   [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe);
   // Homogeneous world point (x, y, z, rho): the point is xyz / rho, also when rho is 0.

@@ -81,7 +81,7 @@ inline Keyframe make_keyframe(const Rig& rig, int camera, const SE3& T_world_bod
     }
     k.set.features.push_back(f);
     k.set.descriptors.push_back(d);
-    k.bearings.push_back(bearing.cast<float>());
+    k.bearings.emplace_back(bearing.cast<float>());
   }
   return k;
 }

@@ -210,8 +210,8 @@ class MapTest : public testing::Test {
     return h;
   }
   std::vector<KeyframeHandle> keyframes(int n) {
-    std::vector<KeyframeHandle> out;
-    for (int i = 0; i < n; ++i) out.push_back(keyframe(i % 2));
+    std::vector<KeyframeHandle> out(static_cast<std::size_t>(n));
+    for (int i = 0; i < n; ++i) out[static_cast<std::size_t>(i)] = keyframe(i % 2);
     return out;
   }
   std::vector<std::uint64_t> observers(LandmarkHandle h) {
