@@ -124,7 +124,7 @@ std::string time_line(const Runs& runs) {
   double x = kLeft_px - 60;
   for (std::size_t i = 0; i < kFills.size(); ++i) {
     svg.rectangle({x, bottom + 40}, {14, 12}, std::string("fill=\"") + kFills[i] + "\" stroke=\"#333\"");
-    svg.text({x + 18, bottom + 50}, slam::to_string(slam::State(i)), Anchor::kStart);
+    svg.text({x + 18, bottom + 50}, slam::to_string(static_cast<slam::State>(i)), Anchor::kStart);
     x += 112;
   }
   return svg.finish("States and faults over time");
@@ -134,6 +134,7 @@ template <typename Message, typename Figure>
 std::vector<Eigen::Vector2d> over_time(const RunRecord& run, const std::vector<Message>& messages,
                                        Figure&& figure) {
   std::vector<Eigen::Vector2d> points;
+  points.reserve(messages.size());
   for (const Message& m : messages)
     points.emplace_back(seconds_of(m.utime) - run.start_s, static_cast<double>(figure(m)));
   return points;

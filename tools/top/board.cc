@@ -60,8 +60,9 @@ const char* scale_text(int scale) {
 }  // namespace
 
 const char* state_name(int state) {
-  return state >= 0 && state <= static_cast<int>(slam::State::kNoCamera) ? slam::to_string(slam::State(state))
-                                                                         : "?";
+  return state >= 0 && state <= static_cast<int>(slam::State::kNoCamera)
+             ? slam::to_string(static_cast<slam::State>(state))
+             : "?";
 }
 
 const char* can_state_name(int state) {
