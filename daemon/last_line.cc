@@ -49,6 +49,13 @@ std::string refused_text(const InputCounts& in, std::int64_t frames_dropped) {
   return text;
 }
 
+// What a map of fixed size lost, where anything was.
+std::string forgotten_text(const slam::EstimatorCounts& counts) {
+  if (counts.keyframes_forgotten == 0) return "";
+  return fmt::format("; the full map forgot {} keyframes and {} landmarks", counts.keyframes_forgotten,
+                     counts.landmarks_forgotten);
+}
+
 const char* calibration_text(const RunEnd& end) {
   return end.counts.calibration_contradicted ? "; the images contradict the calibration" : "";
 }
@@ -65,12 +72,13 @@ std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t fra
   return fmt::format(
       "farpointd: {}: {} frames, {} tracked ({:.1f} %), {} map{}, lost {} time{}, scale {}; {:.1f} ms a "
       "frame (CPU "
-      "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}",
+      "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}",
       outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames), maps,
       maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s", scale_text(end.last.scale),
       cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()), quantile(cpu_ms, 0.99),
-      static_cast<double>(peak_resident_bytes()) / kMegabyte, calibration_text(end),
-      refused_text(in, frames_dropped), written.empty() ? "" : "; wrote ", fmt::join(written, " "));
+      static_cast<double>(peak_resident_bytes()) / kMegabyte, forgotten_text(end.counts),
+      calibration_text(end), refused_text(in, frames_dropped), written.empty() ? "" : "; wrote ",
+      fmt::join(written, " "));
 }
 
 std::FILE* line_stream(const Options& o) {

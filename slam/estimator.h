@@ -84,6 +84,8 @@ struct FrameResult {
 // Counts over the whole run and of the present map.
 struct EstimatorCounts {
   std::uint64_t frames = 0, frames_rejected = 0, keyframes_made = 0, keyframes_culled = 0, maps = 0, lost = 0;
+  std::uint64_t keyframes_forgotten = 0,
+                landmarks_forgotten = 0;  // because the map was full; culled ones too
   std::uint64_t keyframes_dropped = 0;    // wanted, and not made because mapping was behind
   std::uint64_t frames_not_recorded = 0;  // missing in the final trajectory: mapping was far behind
   std::uint64_t landmarks_made = 0, landmarks_culled = 0, landmarks_fused = 0;

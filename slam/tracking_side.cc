@@ -235,6 +235,8 @@ void TrackingSide::note_counts(const MappingReply& reply) {
   const MappingCounts& m = reply.counts;
   counts_.keyframes_made = m.keyframes_made;
   counts_.keyframes_culled = m.keyframes_culled;
+  counts_.keyframes_forgotten = m.keyframes_forgotten;
+  counts_.landmarks_forgotten = m.landmarks_forgotten;
   counts_.landmarks_made = m.landmarks_made;
   counts_.landmarks_culled = m.landmarks_culled;
   counts_.landmarks_fused = m.landmarks_fused;

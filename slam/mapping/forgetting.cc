@@ -63,11 +63,11 @@ void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Ma
     return map->keyframes()[a].id > map->keyframes()[b].id;
   });
   for (std::size_t i = kept; i < alive.size(); ++i) map->thin_keyframe(alive[i]);
+  const std::size_t keyframes = map->keyframes().size(), landmarks = map->landmarks().size();
   // A full map forgets its oldest keyframe.
   while (map->keyframes().full() && !alive.empty()) {
     if (alive.back() == newest) break;
     map->remove_keyframe(alive.back());
-    ++counts->keyframes_culled;
     alive.pop_back();
   }
   // A full landmark pool: the oldest keyframes' landmarks go with them.
@@ -80,9 +80,11 @@ void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Ma
         map->remove_landmark(h), ++counts->landmarks_culled;
     }
     map->remove_keyframe(oldest);
-    ++counts->keyframes_culled;
     alive.pop_back();
   }
+  counts->keyframes_culled += keyframes - map->keyframes().size();
+  counts->keyframes_forgotten += keyframes - map->keyframes().size();
+  counts->landmarks_forgotten += landmarks - map->landmarks().size();
 }
 
 }  // namespace farpoint::slam

@@ -166,6 +166,9 @@ TEST(Forgetting, SmallMapsGoOnForEver) {
       });
   EXPECT_GE(r.most_keyframes, 23U);  // it was full
   EXPECT_GT(r.counts.keyframes_made, 40U);
+  EXPECT_GT(r.counts.keyframes_forgotten, 10U);
+  EXPECT_GT(r.counts.landmarks_forgotten, 500U);
+  EXPECT_LE(r.counts.keyframes_forgotten, r.counts.keyframes_culled);
   EXPECT_EQ(r.counts.lost, 0U);
   EXPECT_EQ(r.counts.maps, 1U);
   EXPECT_GT(r.posed_frames, 0.98 * scene.frames);
