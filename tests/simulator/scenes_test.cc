@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "tests/simulator/evaluation.h"
 
@@ -28,6 +27,7 @@ RunReport run_mode(const Scene& scene, std::uint64_t seed, LandmarkMode mode) {
 
 std::vector<double> magnitudes(const std::vector<LandmarkError>& errors) {
   std::vector<double> out;
+  out.reserve(errors.size());
   for (const LandmarkError& e : errors) out.push_back(std::fabs(e.normalised_global));
   return out;
 }
@@ -249,8 +249,7 @@ TEST(Modes, SameSeedSameBytes) {
   ASSERT_GT(live[0].size(), 30U);
   ASSERT_EQ(live[0].size(), live[1].size());
   const auto same = [](const slam::SE3& a, const slam::SE3& b) {
-    return std::memcmp(a.t.data(), b.t.data(), 3 * sizeof(double)) == 0 &&
-           std::memcmp(a.q.coeffs().data(), b.q.coeffs().data(), 4 * sizeof(double)) == 0;
+    return a.t == b.t && a.q.coeffs() == b.q.coeffs();
   };
   for (std::size_t k = 0; k < live[0].size(); ++k) EXPECT_TRUE(same(live[0][k], live[1][k])) << k;
   ASSERT_EQ(r[0].trajectories.size(), 1U);
