@@ -90,6 +90,7 @@ void Session::remember(const slam::FrameResult& published, bool valid, bool with
 
 const RunEnd& Session::finish(const InputCounts& in) {
   estimator_.finish();
+  estimator_.release_frames();
   if (config_.estimator.calibration.refine) print_calibration(estimator_.calibration());
   end_.counts = estimator_.counts();
   end_.trajectories = estimator_.trajectories();

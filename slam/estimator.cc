@@ -126,19 +126,23 @@ void Estimator::finish() {
   impl_->tracking.take_counts();
 }
 
+void Estimator::release_frames() {
+  impl_->tracking.release_frames();
+}
+
 const EstimatorCounts& Estimator::counts() const {
   return impl_->tracking.counts();
 }
 
 std::vector<MapTrajectory> Estimator::trajectories() const {
   std::vector<MapTrajectory> out;
-  for (const RecordedFrame& r : impl_->mapping.recorded()) {
+  for (const KeptFrame& r : impl_->mapping.recorded()) {
     SE3 T_world_reference;
     if (!impl_->mapping.mapper().map().pose_of(r.reference_id, &T_world_reference)) continue;
     auto it =
         std::find_if(out.begin(), out.end(), [&](const MapTrajectory& t) { return t.map_id == r.map_id; });
     if (it == out.end()) it = out.insert(out.end(), MapTrajectory{r.map_id, {}});
-    it->frames.push_back({r.utime, T_world_reference * r.T_reference_body});
+    it->frames.push_back({r.utime, T_world_reference * r.T_reference_body()});
   }
   for (MapTrajectory& t : out)
     std::stable_sort(t.frames.begin(), t.frames.end(),
@@ -218,8 +222,8 @@ std::vector<std::pair<std::string, std::size_t>> Estimator::memory_table() const
   table.emplace_back("local views", impl_->mapping.mapper().view_bytes());
   table.emplace_back("exchange of jobs", impl_->exchange.bytes());
   table.emplace_back("tracker of mapping", impl_->mapping.tracker_bytes());
-  table.emplace_back("keyframes", map.keyframes().bytes());
-  table.emplace_back("landmarks", map.landmarks().bytes());
+  table.emplace_back("keyframes", map.keyframe_bytes());
+  table.emplace_back("landmarks", map.landmark_bytes());
   return table;
 }
 

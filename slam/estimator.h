@@ -84,8 +84,8 @@ struct FrameResult {
 // Counts over the whole run and of the present map.
 struct EstimatorCounts {
   std::uint64_t frames = 0, frames_rejected = 0, keyframes_made = 0, keyframes_culled = 0, maps = 0, lost = 0;
-  std::uint64_t keyframes_forgotten = 0,
-                landmarks_forgotten = 0;  // because the map was full; culled ones too
+  // Because the map was full. The keyframes are among the culled ones.
+  std::uint64_t keyframes_forgotten = 0, landmarks_forgotten = 0;
   std::uint64_t keyframes_dropped = 0;    // wanted, and not made because mapping was behind
   std::uint64_t frames_not_recorded = 0;  // missing in the final trajectory: mapping was far behind
   std::uint64_t landmarks_made = 0, landmarks_culled = 0, landmarks_fused = 0;
@@ -182,6 +182,9 @@ class Estimator {
 
   // Finishes what mapping had queued; no extra optimisation. Threads must have ended.
   void finish();
+  // After finish(): gives up the frames and images that wait to be filled, so that what is made of the run
+  // needs no more memory than the run did. No frame can be processed afterwards.
+  void release_frames();
 
   // As of the last frame; tracking's thread. After finish(): of the whole run.
   [[nodiscard]] const EstimatorCounts& counts() const;

@@ -29,6 +29,18 @@ void empty(MappingJob* job) {
 
 }  // namespace
 
+KeptFrame::KeptFrame(const RecordedFrame& frame)
+    : utime(frame.utime), map_id(frame.map_id), reference_id(static_cast<std::uint32_t>(frame.reference_id)) {
+  const SE3& T = frame.T_reference_body;
+  Eigen::Map<Eigen::Vector4f>(q_.data()) = T.q.coeffs().cast<float>();
+  Eigen::Map<Eigen::Vector3f>(t_.data()) = T.t.cast<float>();
+}
+
+SE3 KeptFrame::T_reference_body() const {
+  const Eigen::Vector4d q = Eigen::Map<const Eigen::Vector4f>(q_.data()).cast<double>();
+  return {Eigen::Quaterniond(q).normalized(), Eigen::Map<const Eigen::Vector3f>(t_.data()).cast<double>()};
+}
+
 Exchange::Exchange(const EstimatorConfig& config)
     : jobs(kJobs, roomy_job(config)), replies(kReplies), recorded(kRecords) {
   // Copies of the roomy job have its sizes; clearing keeps the memory.

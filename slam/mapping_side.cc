@@ -1,7 +1,6 @@
 #include "slam/mapping_side.h"
 
 #include <algorithm>
-#include <ranges>
 
 namespace farpoint::slam {
 
@@ -10,7 +9,7 @@ MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange
 
 void MappingSide::collect_recorded() {
   while (const RecordedFrame* frame = exchange_.recorded.front()) {
-    if (config_.capacity.whole_trajectory) recorded_.push_back(*frame);
+    if (config_.capacity.whole_trajectory) recorded_.emplace_back(*frame);
     exchange_.recorded.pop();
   }
 }
@@ -70,7 +69,7 @@ void MappingSide::hand_over() {
 }
 
 void MappingSide::discard_map(std::int32_t map_id) {
-  std::erase_if(recorded_, [&](const RecordedFrame& r) { return r.map_id == map_id; });
+  std::erase_if(recorded_, [&](const KeptFrame& r) { return r.map_id == map_id; });
   mapper_.discard_map(map_id);
 }
 
@@ -88,7 +87,7 @@ bool MappingSide::pose_frame(const MappingJob& job, const Frame& frame, SE3* pri
 // map was being made.
 void MappingSide::pose_frames(const MappingJob& job) {
   const auto first = std::find_if(recorded_.begin(), recorded_.end(),
-                                  [&](const RecordedFrame& r) { return r.map_id == job.map_id; });
+                                  [&](const KeptFrame& r) { return r.map_id == job.map_id; });
   SE3 T_world_first;
   if (first == recorded_.end() || !mapper_.map().pose_of(first->reference_id, &T_world_first)) return;
   poser_.adopt(job.view, job.seen);
@@ -103,10 +102,11 @@ void MappingSide::pose_frames(const MappingJob& job) {
   // The pair's second frame was recorded next, and stands at the second keyframe.
   if (const auto second = std::next(first); second != recorded_.end())
     (void)mapper_.map().pose_of(second->reference_id, &prior);
-  for (const Frame* f : std::ranges::reverse_view(frames))
+  std::for_each(frames.rbegin(), frames.rend(), [&](const Frame* f) {
     if (f->number > job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
+  });
   poser_.adopt(nullptr, {});
-  recorded_.insert(recorded_.end(), posed.begin(), posed.end());
+  for (const RecordedFrame& frame : posed) recorded_.emplace_back(frame);
 }
 
 }  // namespace farpoint::slam

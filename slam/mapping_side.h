@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "slam/exchange.h"
+#include "slam/map/growing_memory.h"
 #include "slam/mapping/mapper.h"
 #include "slam/tracking/tracker.h"
 
@@ -33,7 +34,7 @@ class MappingSide {
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
   // Empty without capacity.whole_trajectory.
-  [[nodiscard]] const std::deque<RecordedFrame>& recorded() const { return recorded_; }
+  [[nodiscard]] const std::pmr::deque<KeptFrame>& recorded() const { return recorded_; }
   // Of the tracker that poses frames afterwards.
   [[nodiscard]] std::size_t tracker_bytes() const { return poser_.bytes(); }
 
@@ -47,7 +48,9 @@ class MappingSide {
   Exchange& exchange_;
   Mapper mapper_;
   Tracker poser_;
-  std::deque<RecordedFrame> recorded_;  // grows to the run's end, hence never copied
+  GrowingMemory recorded_memory_;
+  // Grows to the run's end, hence never copied.
+  std::pmr::deque<KeptFrame> recorded_{recorded_memory_.resource()};
   MappingReply* reply_ = nullptr;
   StageListener* listener_ = nullptr;
   std::uint64_t replies_ = 0;

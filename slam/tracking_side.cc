@@ -471,6 +471,11 @@ void TrackingSide::finish() {
   if (!waiting_.empty() && state_ != State::kInitialising && tracker_.view() != nullptr) pose_waiting();
 }
 
+void TrackingSide::release_frames() {
+  frames_ = {};
+  pyramids_ = {};
+}
+
 void TrackingSide::take_counts() {
   while (MappingReply* reply = exchange_.replies.front()) {
     note_counts(*reply);

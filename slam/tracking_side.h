@@ -41,6 +41,8 @@ class TrackingSide {
   // At the end: asks mapping for the frames that still wait for a pose; then, when mapping has done it, takes
   // its last counts.
   void finish();
+  // No frame can be processed afterwards.
+  void release_frames();
   void take_counts();
 
   [[nodiscard]] const EstimatorCounts& counts() const { return counts_; }

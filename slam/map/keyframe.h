@@ -24,9 +24,9 @@ struct Keyframe {
   int camera = 0;
   SE3 T_world_body;
 
-  FeatureSet set;                         // Map::thin_keyframe leaves only corners of landmarks
-  std::vector<LandmarkHandle> landmarks;  // one a feature; null: none
+  std::vector<LandmarkHandle> landmarks;  // one a feature; null: none. Thinned: one an observation
   // For the search for new landmarks, while the keyframe is recent (CapacityConfig::window_images):
+  FeatureSet set;
   std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
   FeatureGrid grid;
   std::shared_ptr<const FrameImage> image;  // pixels for alignment

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory_resource>
 #include <vector>
 
 #include "slam/geometry/se3.h"
@@ -27,6 +28,7 @@ struct Observation {
   std::int32_t feature = -1;                        // index in the keyframe's features
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // measured (aligned) level-0 pixel
   float sigma_px = 1.0F;                            // its error, level-0 pixels
+  std::uint8_t level = 0;                           // of the corner; the map fills it in
 };
 
 struct Landmark {
@@ -53,7 +55,7 @@ struct Landmark {
   Patch patch;
   Descriptor descriptor;
   std::uint8_t host_level = 0;
-  std::vector<Observation> observations;  // by ascending keyframe id
+  std::pmr::vector<Observation> observations;  // by ascending keyframe id; in the room of its map
 
   // Statistics for culling and reports.
   std::uint64_t created_keyframe = 0;  // id of the keyframe at which it was made (bearing) or promoted

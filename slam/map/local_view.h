@@ -22,6 +22,7 @@ struct ViewLandmark {
   std::uint8_t host_level = 0;
   bool in_reference = false;  // seen by the reference keyframe
   bool confirmed = false;     // state full
+  double nearness = 0;        // in_reference: 1 / distance from the reference's camera, 1 / map units
 };
 
 struct ViewKeyframe {
@@ -37,10 +38,11 @@ struct LocalView {
   SE3 T_world_reference;
   std::vector<ViewKeyframe> keyframes;  // the window, for re-expressing older poses
   std::vector<ViewLandmark> landmarks;
-  int reference_landmarks = 0;  // full landmarks in the reference keyframe
-  int map_keyframes = 0;        // alive in this map
-  double median_depth = 1.0;    // of the reference keyframe's landmarks, map units
-  bool settled = false;         // the map's scale holds (mapping/settling)
+  int reference_landmarks = 0;    // full landmarks in the reference keyframe
+  double reference_nearness = 0;  // theirs in sum
+  int map_keyframes = 0;          // alive in this map
+  double median_depth = 1.0;      // of the reference keyframe's landmarks, map units
+  bool settled = false;           // the map's scale holds (mapping/settling)
 };
 
 }  // namespace farpoint::slam

@@ -2,32 +2,100 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace farpoint::slam {
 
 namespace {
 
-// Arrays of a thinned keyframe come in multiples of this, so that what one leaves fits another.
+// Thinned keyframes keep a sixth to a third of their features: the corners of landmarks.
+constexpr std::size_t kThinnedShare = 3;
+// An array for more than that comes in multiples of this, so that what one leaves fits another.
 constexpr std::size_t kThinStep = 128;
+constexpr std::size_t kObservationStep = 4;
+// Observations for which room is taken at the start, of those for which thinned keyframes have room (whose
+// landmarks go while they stay).
+constexpr double kObservedShare = 0.75;
+
+std::size_t observations_of_full_map(const CapacityConfig& capacity, std::size_t features) {
+  const std::size_t thinned = features / kThinnedShare * static_cast<std::size_t>(capacity.keyframes);
+  return static_cast<std::size_t>(kObservedShare * static_cast<double>(thinned));
+}
+
+// Touched, not only reserved: a page that is first used on the road is a page fault on the road.
+template <typename T>
+void make_room(std::size_t size, std::vector<T>* array) {
+  array->resize(size);
+  array->clear();
+}
+
+Keyframe room_for(std::size_t features) {
+  Keyframe room;
+  make_room(features, &room.set.features);
+  make_room(features, &room.set.descriptors);
+  make_room(features, &room.landmarks);
+  make_room(features, &room.bearings);
+  return room;
+}
+
+// The slot's list of covisible keyframes is emptied, and keeps its room.
+void refill(Keyframe&& with, Keyframe* slot) {
+  std::vector<Covisible> room = std::move(slot->covisible);
+  room.clear();
+  *slot = std::move(with);
+  slot->covisible = std::move(room);
+}
+
+std::size_t array_bytes(const Keyframe& k) {
+  return k.set.features.capacity() * sizeof(Feature) + k.set.descriptors.capacity() * sizeof(Descriptor) +
+         k.landmarks.capacity() * sizeof(LandmarkHandle) + k.bearings.capacity() * sizeof(Eigen::Vector3f) +
+         k.grid.bytes();
+}
 
 }  // namespace
 
-Map::Map(const CapacityConfig& capacity, const Rig& rig, double wide_parallax_rad)
+Map::Map(const CapacityConfig& capacity, const Rig& rig, const MapOptions& options)
     : capacity_(capacity),
       rig_(rig),
-      wide_parallax_rad_(wide_parallax_rad),
+      options_(options),
       keyframes_(static_cast<std::size_t>(capacity.keyframes)),
+      observation_room_(observations_of_full_map(capacity, options.features),
+                        static_cast<std::size_t>(capacity.observations_per_landmark) + kObservationStep),
       landmarks_(static_cast<std::size_t>(capacity.landmarks)),
-      shared_(static_cast<std::size_t>(capacity.keyframes)) {}
+      thinned_room_(options.features / kThinnedShare),
+      shared_(static_cast<std::size_t>(capacity.keyframes)) {
+  landmarks_.for_each_slot([this](Landmark& l) {
+    std::destroy_at(&l.observations);
+    std::construct_at(&l.observations, observation_room_.resource());
+  });
+  if (options.features == 0) return;
+  for (int i = 0; i <= capacity.window_images; ++i) rooms_.push_back(room_for(options.features));
+  thinned_rooms_.resize(keyframes_.capacity());
+  for (auto& room : thinned_rooms_) make_room(thinned_room_, &room);
+  keyframes_.for_each_slot([&](Keyframe& k) { make_room(covisible_room(), &k.covisible); });
+}
+
+std::size_t Map::keyframe_bytes() const {
+  std::size_t bytes = keyframes_.bytes();
+  const auto add = [&bytes](const Keyframe& k) { bytes += array_bytes(k); };
+  std::for_each(rooms_.begin(), rooms_.end(), add);
+  keyframes_.for_each([&](KeyframeHandle, const Keyframe& k) { add(k); });
+  keyframes_.for_each_slot(
+      [&bytes](const Keyframe& k) { bytes += k.covisible.capacity() * sizeof(Covisible); });
+  return bytes + thinned_rooms_.size() * thinned_room_ * sizeof(LandmarkHandle);
+}
+
+std::size_t Map::landmark_bytes() const {
+  return landmarks_.bytes() + observation_room_.bytes();
+}
 
 KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   const KeyframeHandle handle = keyframes_.allocate();
   if (handle.is_null()) return handle;
   Keyframe& slot = keyframes_[handle];
-  slot = std::move(keyframe);
+  refill(std::move(keyframe), &slot);
   slot.id = next_keyframe_id_++;
   slot.landmarks.assign(slot.set.features.size(), {});
-  slot.covisible.clear();
   slot.optimised = 0;
   add_to_skeleton(handle);
   return handle;
@@ -55,19 +123,21 @@ void Map::remove_keyframe(KeyframeHandle handle) {
   if (keyframe.id >= first_in_skeleton_) {
     SkeletonNode& node = skeleton_[keyframe.id - first_in_skeleton_];
     node.alive = {};
-    node.known = !parent.is_null();
-    if (node.known) {
+    if (!parent.is_null()) {
+      const SE3 T_parent_this = keyframes_[parent].T_world_body.inverse() * keyframe.T_world_body;
       node.parent_id = keyframes_[parent].id;
-      node.T_parent_this = keyframes_[parent].T_world_body.inverse() * keyframe.T_world_body;
+      node.q_parent_this = T_parent_this.q;
+      node.t_parent_this = T_parent_this.t;
     }
   }
   for (const LandmarkHandle& l : keyframe.landmarks)
     if (landmarks_.contains(l)) remove_observation(l, handle);
-  for (const Covisible& c : keyframe.covisible)
-    if (Keyframe* other = keyframes_.get(c.keyframe))
-      std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
-  if (keyframe.image) keep_room_of(&keyframe);
-  keyframe = Keyframe{};
+  leave_covisible(handle);
+  if (keyframe.image)
+    keep_room_of(&keyframe);
+  else
+    keep_thinned_room(std::move(keyframe.landmarks));
+  refill({}, &keyframe);
   keyframes_.release(handle);
 }
 
@@ -90,24 +160,35 @@ void Map::thin_keyframe(KeyframeHandle handle) {
   Keyframe& k = keyframes_[handle];
   if (!k.image) return;  // it has been thinned before
   k.image.reset();
-  std::vector<Feature> features;
-  std::vector<LandmarkHandle> landmarks;
   const auto used = static_cast<std::size_t>(
       std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
-  const std::size_t room = (used + kThinStep - 1) / kThinStep * kThinStep;
-  features.reserve(room);
-  landmarks.reserve(room);
-  for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
-    Landmark* l = landmarks_.get(k.landmarks[i]);
+  std::vector<LandmarkHandle> landmarks = thinned_room(used);
+  for (const LandmarkHandle& seen : k.landmarks) {
+    Landmark* l = landmarks_.get(seen);
     if (l == nullptr) continue;
     for (Observation& o : l->observations)
       if (o.keyframe == handle) o.feature = static_cast<std::int32_t>(landmarks.size());
-    features.push_back(k.set.features[i]);
-    landmarks.push_back(k.landmarks[i]);
+    landmarks.push_back(seen);
   }
   keep_room_of(&k);
-  k.set = {std::move(features), {}};
   k.landmarks = std::move(landmarks);
+}
+
+std::vector<LandmarkHandle> Map::thinned_room(std::size_t landmarks) {
+  std::vector<LandmarkHandle> room;
+  if (landmarks <= thinned_room_ && !thinned_rooms_.empty()) {
+    room = std::move(thinned_rooms_.back());
+    thinned_rooms_.pop_back();
+    room.clear();
+  } else {
+    room.reserve((landmarks + kThinStep - 1) / kThinStep * kThinStep);
+  }
+  return room;
+}
+
+void Map::keep_thinned_room(std::vector<LandmarkHandle>&& room) {
+  // A larger one is rare and goes back to the heap, or all would grow to the largest in time.
+  if (thinned_room_ > 0 && room.capacity() == thinned_room_) thinned_rooms_.push_back(std::move(room));
 }
 
 LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
@@ -138,7 +219,7 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
   l.host_level = f.level;
   l.created_keyframe = l.last_seen_keyframe = keyframe.id;
   l.created_utime = keyframe.utime;
-  l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F});
+  l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F, f.level});
   keyframe.landmarks[feature] = handle;
   return handle;
 }
@@ -186,7 +267,8 @@ void Map::remove_landmark(LandmarkHandle handle) {
   if (l == nullptr) return;
   for (const Observation& o : l->observations) detach_feature(o);
   // A slot must not keep what its best-seen landmark once needed, as with "= {}" it would.
-  std::vector<Observation>().swap(l->observations);
+  l->observations.clear();
+  l->observations.shrink_to_fit();
   landmarks_.release(handle);
 }
 
@@ -206,7 +288,13 @@ bool Map::add_observation(LandmarkHandle handle, const Observation& observation)
   k.landmarks[feature] = handle;
   const auto later = std::find_if(l.observations.begin(), l.observations.end(),
                                   [&](const Observation& o) { return keyframes_[o.keyframe].id > k.id; });
-  l.observations.insert(later, observation);
+  const auto at = later - l.observations.begin();
+  // Doubling would leave a third of the room empty.
+  if (l.observations.size() == l.observations.capacity())
+    l.observations.reserve(l.observations.size() + kObservationStep);
+  const auto added = l.observations.insert(l.observations.begin() + at, observation);
+  // A thinned keyframe knows its corners no longer: the sighting has to.
+  if (feature < k.set.features.size()) added->level = k.set.features[feature].level;
   l.last_seen_keyframe = std::max(l.last_seen_keyframe, k.id);
   note_parallax(observation, &l);
   if (l.observations.size() > static_cast<std::size_t>(capacity_.observations_per_landmark))
@@ -263,7 +351,7 @@ void Map::rehost(LandmarkHandle handle, KeyframeHandle new_host) {
 
 void Map::fuse(LandmarkHandle into, LandmarkHandle from) {
   if (into == from || !landmarks_.contains(into) || !landmarks_.contains(from)) return;
-  const std::vector<Observation> moved = landmarks_[from].observations;
+  const auto moved = landmarks_[from].observations;
   const std::uint32_t found = landmarks_[from].found, visible = landmarks_[from].visible;
   remove_landmark(from);
   for (const Observation& o : moved) {
@@ -304,38 +392,49 @@ double Map::parallax(const Landmark& l, const Observation& o) const {
 
 void Map::update_covisibility(KeyframeHandle handle) {
   Keyframe& keyframe = keyframes_[handle];
+  const std::size_t most = options_.covisible > 0 ? options_.covisible : keyframes_.capacity();
   std::fill(shared_.begin(), shared_.end(), Shared{});
   for (const LandmarkHandle& lh : keyframe.landmarks) {
     const Landmark* l = landmarks_.get(lh);
     if (l == nullptr || l->state == LandmarkState::kBearing) continue;
-    const int wide = l->max_parallax_rad >= wide_parallax_rad_ ? 1 : 0;
+    const int wide = is_wide(*l) ? 1 : 0;
     for (const Observation& o : l->observations) {
       ++shared_[o.keyframe.index].all;
       shared_[o.keyframe.index].wide += wide;
     }
   }
-  for (const Covisible& c : keyframe.covisible)
-    if (Keyframe* other = keyframes_.get(c.keyframe))
-      std::erase_if(other->covisible, [&](const Covisible& o) { return o.keyframe == handle; });
+  leave_covisible(handle);
   const auto stronger = [this](const Covisible& a, const Covisible& b) {
     if (a.wide != b.wide) return a.wide > b.wide;
     if (a.shared != b.shared) return a.shared > b.shared;
     return keyframes_[a.keyframe].id > keyframes_[b.keyframe].id;
   };
-  keyframe.covisible.clear();
+  // Counted in a list of its own: the keyframe's would keep the room of all that share anything.
+  counted_.clear();
   keyframes_.for_each([&](KeyframeHandle h, Keyframe& other) {
     const Shared& shared = shared_[h.index];
     if (h == handle || shared.all == 0) return;
-    keyframe.covisible.push_back({h, shared.all, shared.wide});
+    counted_.push_back({h, shared.all, shared.wide});
     const Covisible back{handle, shared.all, shared.wide};
     other.covisible.insert(std::lower_bound(other.covisible.begin(), other.covisible.end(), back, stronger),
                            back);
+    if (other.covisible.size() > most) other.covisible.pop_back();
   });
-  std::sort(keyframe.covisible.begin(), keyframe.covisible.end(), stronger);
+  std::sort(counted_.begin(), counted_.end(), stronger);
+  const auto noted = static_cast<std::ptrdiff_t>(std::min(most, counted_.size()));
+  keyframe.covisible.assign(counted_.begin(), counted_.begin() + noted);
+}
+
+// A list may hold a keyframe whose own list, full of stronger ones, does not hold its owner.
+void Map::leave_covisible(KeyframeHandle handle) {
+  keyframes_.for_each([&](KeyframeHandle, Keyframe& other) {
+    std::erase_if(other.covisible, [&](const Covisible& o) { return o.keyframe == handle; });
+  });
 }
 
 void Map::add_to_skeleton(KeyframeHandle keyframe) {
-  skeleton_.push_back({keyframe, 0, {}, true});
+  SkeletonNode& node = skeleton_.emplace_back();
+  node.alive = keyframe;
   // Whoever asks for a removed keyframe's pose has seen it lately: tracking, some views ago.
   if (capacity_.whole_trajectory || skeleton_.size() <= 2 * keyframes_.capacity()) return;
   skeleton_.pop_front();
@@ -350,12 +449,12 @@ const Map::SkeletonNode* Map::skeleton_node(std::uint64_t id) const {
 bool Map::pose_of(std::uint64_t id, SE3* T_world_body) const {
   SE3 tail;
   while (const SkeletonNode* node = skeleton_node(id)) {
-    if (!node->known) return false;
     if (const Keyframe* k = keyframes_.get(node->alive)) {
       *T_world_body = k->T_world_body * tail;
       return true;
     }
-    tail = node->T_parent_this * tail;
+    if (node->parent_id == 0) return false;
+    tail = SE3{Eigen::Quaterniond(node->q_parent_this), node->t_parent_this} * tail;
     id = node->parent_id;
   }
   // A keyframe may outlive its place in the skeleton.

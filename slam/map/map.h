@@ -9,15 +9,32 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/map/growing_memory.h"
 #include "slam/map/keyframe.h"
 #include "slam/map/landmark.h"
+#include "slam/map/observation_room.h"
 
 namespace farpoint::slam {
 
+struct MapOptions {
+  double wide_parallax_rad = 0.0;  // from where a landmark shows translation
+  // Most of a keyframe: room for them is taken at once. 0: it is taken as it is needed.
+  std::size_t features = 0;
+  // Most covisible keyframes that one remembers. One that goes is not replaced before the next count. 0: all.
+  std::size_t covisible = 0;
+};
+
 class Map {
  public:
-  // wide_parallax_rad: from this angle between two sightings on, a landmark shows translation.
-  Map(const CapacityConfig& capacity, const Rig& rig, double wide_parallax_rad = 0.0);
+  Map(const CapacityConfig& capacity, const Rig& rig, const MapOptions& options = {});
+
+  // Landmarks keep their observations in memory of this very map.
+  Map(const Map&) = delete;
+  Map& operator=(const Map&) = delete;
+
+  // What keyframes and landmarks take, their arrays included.
+  [[nodiscard]] std::size_t keyframe_bytes() const;
+  [[nodiscard]] std::size_t landmark_bytes() const;
 
   // Keyframes.
 
@@ -30,8 +47,8 @@ class Map {
   // most covisible keyframe, and frees the slot. Landmarks left with fewer than two observers go.
   void remove_keyframe(KeyframeHandle handle);
   // Lets go of the pixels and of all that serves only the search for new landmarks: descriptors, bearings,
-  // grid, and the features that belong to no landmark. Observations keep naming the right feature. Nothing
-  // new can be matched with the keyframe afterwards.
+  // grid, corners. Of landmarks only those are left that it sees, and observations are renumbered with them.
+  // Nothing new can be matched with the keyframe afterwards.
   void thin_keyframe(KeyframeHandle handle);
 
   // Landmarks.
@@ -61,11 +78,17 @@ class Map {
   // Angle between the host's ray and the observer's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 
+  // Shows translation: two of its sightings are far enough apart (MapOptions::wide_parallax_rad).
+  [[nodiscard]] bool is_wide(const Landmark& landmark) const {
+    return landmark.max_parallax_rad >= options_.wide_parallax_rad;
+  }
+
   // Uses a refined calibration from now on: the bearings of landmarks, and of keyframes that still have
   // pixels, are made anew; poses and inverse depths stay.
   void set_camera(int index, const Camera& camera);
 
-  // Counts again which keyframes share landmarks with this one, both ways.
+  // Counts again which keyframes share landmarks with this one, and notes it with both where it is among the
+  // strongest.
   void update_covisibility(KeyframeHandle handle);
 
   // Pose of any keyframe ever made in a living map by its id, also of removed ones (without
@@ -83,15 +106,22 @@ class Map {
 
  private:
   // Where a keyframe id is now: alive in a slot, or rigidly attached to another keyframe.
+  // A long run has hundreds of thousands: without the padding that an SE3's alignment asks for.
   struct SkeletonNode {
     KeyframeHandle alive;
-    std::uint64_t parent_id = 0;
-    SE3 T_parent_this;
-    bool known = false;
+    std::uint64_t parent_id = 0;  // 0: none, its place is not known
+    Eigen::Quaternion<double, Eigen::DontAlign> q_parent_this;
+    Eigen::Vector3d t_parent_this;
   };
 
   void add_to_skeleton(KeyframeHandle keyframe);
+  [[nodiscard]] std::size_t covisible_room() const {
+    return options_.covisible > 0 ? options_.covisible + 1 : 0;  // one more comes before the weakest goes
+  }
+  void leave_covisible(KeyframeHandle handle);
   void keep_room_of(Keyframe* keyframe);
+  [[nodiscard]] std::vector<LandmarkHandle> thinned_room(std::size_t landmarks);
+  void keep_thinned_room(std::vector<LandmarkHandle>&& room);
   // Null where the skeleton no longer reaches back so far.
   [[nodiscard]] const SkeletonNode* skeleton_node(std::uint64_t keyframe_id) const;
   bool set_bearing(Landmark* landmark) const;
@@ -106,15 +136,22 @@ class Map {
 
   CapacityConfig capacity_;
   Rig rig_;
-  double wide_parallax_rad_;
+  MapOptions options_;
   Pool<Keyframe> keyframes_;
+  ObservationRoom observation_room_;
   Pool<Landmark> landmarks_;
-  std::deque<SkeletonNode> skeleton_;  // by keyframe id, from first_in_skeleton_ on
+  GrowingMemory skeleton_memory_;
+  // By keyframe id, from first_in_skeleton_ on.
+  std::pmr::deque<SkeletonNode> skeleton_{skeleton_memory_.resource()};
   std::uint64_t first_in_skeleton_ = 1;
   std::uint64_t next_keyframe_id_ = 1;
   std::uint64_t next_landmark_id_ = 1;
   std::vector<Keyframe> rooms_;  // for roomy_keyframe: no more than had pixels at once
-  std::vector<Shared> shared_;   // scratch of update_covisibility, one a keyframe slot
+  std::size_t thinned_room_;     // landmarks of a thinned keyframe that one of these holds:
+  std::vector<std::vector<LandmarkHandle>> thinned_rooms_;
+  // Scratch of update_covisibility: one a keyframe slot, and those of them that share anything.
+  std::vector<Shared> shared_;
+  std::vector<Covisible> counted_;
 };
 
 }  // namespace farpoint::slam

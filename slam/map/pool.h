@@ -67,6 +67,17 @@ class Pool {
   [[nodiscard]] bool full() const { return size_ == slots_.size(); }
   [[nodiscard]] std::size_t bytes() const { return slots_.size() * (sizeof(Slot) + sizeof(std::uint32_t)); }
 
+  // Calls visit(object) for every slot, alive or not: to give each its room at the start.
+  template <typename Visitor>
+  void for_each_slot(Visitor&& visit) {
+    for (Slot& slot : slots_) visit(slot.value);
+  }
+
+  template <typename Visitor>
+  void for_each_slot(Visitor&& visit) const {
+    for (const Slot& slot : slots_) visit(slot.value);
+  }
+
   // Calls visit(handle, object) for everything alive, by ascending slot. The visitor may release the visited
   // one.
   template <typename Visitor>

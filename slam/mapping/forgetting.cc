@@ -16,12 +16,10 @@ double inverse_distance_from(const Eigen::Vector3d& place_w, const Eigen::Vector
 }
 
 // Whether enough other keyframes see the landmark at least as finely as level `level` does.
-bool seen_by_others(const Map& map, const Landmark& landmark, KeyframeHandle but, int level) {
+bool seen_by_others(const Landmark& landmark, KeyframeHandle but, int level) {
   int others = 0;
   for (const Observation& o : landmark.observations) {
-    if (o.keyframe == but) continue;
-    const Keyframe& other = map.keyframes()[o.keyframe];
-    if (other.set.features[static_cast<std::size_t>(o.feature)].level <= level + 1) ++others;
+    if (o.keyframe != but && o.level <= level + 1) ++others;
     if (others >= kOtherObservers) return true;
   }
   return false;
@@ -32,12 +30,12 @@ bool seen_by_others(const Map& map, const Landmark& landmark, KeyframeHandle but
 bool redundant(const Map& map, KeyframeHandle handle) {
   const Keyframe& k = map.keyframes()[handle];
   double all = 0.0, seen_elsewhere = 0.0;
-  for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
-    const Landmark* l = map.landmarks().get(k.landmarks[i]);
+  for (const LandmarkHandle& h : k.landmarks) {
+    const Landmark* l = map.landmarks().get(h);
     if (l == nullptr || l->state == LandmarkState::kBearing) continue;
     const double weight = inverse_distance_from(k.T_world_body.t, map.world_point(*l));
     all += weight;
-    if (seen_by_others(map, *l, handle, k.set.features[i].level)) seen_elsewhere += weight;
+    if (seen_by_others(*l, handle, Map::find_observation(*l, handle)->level)) seen_elsewhere += weight;
   }
   return all > 0.0 && seen_elsewhere > kRedundantShare * all;
 }
@@ -82,8 +80,9 @@ void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Ma
     map->remove_keyframe(oldest);
     alive.pop_back();
   }
-  counts->keyframes_culled += keyframes - map->keyframes().size();
-  counts->keyframes_forgotten += keyframes - map->keyframes().size();
+  const std::size_t forgotten = keyframes - map->keyframes().size();
+  counts->keyframes_culled += forgotten;
+  counts->keyframes_forgotten += forgotten;
   counts->landmarks_forgotten += landmarks - map->landmarks().size();
 }
 

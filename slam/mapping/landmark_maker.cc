@@ -306,7 +306,7 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
 }
 
 bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
-  const bool wide = l.max_parallax_rad > config_.landmarks.promote_parallax_rad;
+  const bool wide = map_.is_wide(l);
   if (wide || config_.landmarks.mode == LandmarkMode::kBaseline) return wide;
   // Short of the angle a virtual point is as good a point once three keyframes or more agree on its depth as
   // well as two under the angle would: a mismatch along the epipolar line does not survive the third. (A
@@ -361,8 +361,7 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   const SE3 T_camera_anchor = map_.T_world_camera(k).inverse() * map_.T_world_anchor(l);
   const double scale_change =
       1.0 / (T_camera_anchor.q * l.bearing + l.inverse_depth * T_camera_anchor.t).norm();
-  const int level = k.set.features[static_cast<std::size_t>(newest.feature)].level;
-  const double seen_change = std::pow(config_.pyramid.scale_factor, level - l.host_level);
+  const double seen_change = std::pow(config_.pyramid.scale_factor, newest.level - l.host_level);
   const double ratio = scale_change / seen_change;
   if (ratio > kScaleTolerance || ratio < 1.0 / kScaleTolerance) {
     map_.remove_landmark(handle);

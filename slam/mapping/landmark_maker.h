@@ -18,9 +18,9 @@ class LandmarkMaker {
 
   // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes
   // landmarks.
-  void process(KeyframeHandle keyframe, const std::vector<KeyframeHandle>& neighbours);
+  void process(KeyframeHandle newer, const std::vector<KeyframeHandle>& neighbours);
   // A VMP that tracking has seen once more: promotes it where that was what it lacked.
-  void reconsider(LandmarkHandle landmark);
+  void reconsider(LandmarkHandle handle);
   // Gives back the slots of VMPs not seen for a while, and of the least useful ones beyond the limit.
   void evict_bearings(KeyframeHandle newest);
 
@@ -56,9 +56,9 @@ class LandmarkMaker {
                                const PairGeometry& geometry, Eigen::Vector2d* far, Eigen::Vector2d* near);
   void consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
   void create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
-  void attach(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature);
-  void merge(LandmarkHandle a, LandmarkHandle b);
-  void try_promote(LandmarkHandle landmark, bool through_vmp);
+  void attach(LandmarkHandle handle, KeyframeHandle keyframe, std::size_t feature);
+  void merge(LandmarkHandle into, LandmarkHandle from);
+  void try_promote(LandmarkHandle handle, bool through_vmp);
   [[nodiscard]] bool enough_information(const Landmark& landmark, const DepthFit& fit) const;
   // Whether the other keyframes bear out a point that only two have seen. The corners of a pair on a guard
   // rail, a lane marking, in a row of posts or on an asphalt that looks the same everywhere may be two

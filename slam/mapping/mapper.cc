@@ -47,6 +47,16 @@ double shared_error_weight(const BundleProblem& problem, const BundleProblem::Po
   return variance_px2 / (variance_px2 + point.measurements * shared_sigma_px * shared_sigma_px);
 }
 
+MapOptions map_options(const EstimatorConfig& config) {
+  MapOptions options;
+  options.wide_parallax_rad = config.landmarks.promote_parallax_rad;
+  options.features = static_cast<std::size_t>(config.extractor.features);
+  // Twice what is ever asked for: some of a list go with their keyframes before it is made anew.
+  const int asked = std::max(config.mapping.neighbours, config.mapping.window_keyframes);
+  options.covisible = 2 * std::max(kViewNeighbours, static_cast<std::size_t>(asked));
+  return options;
+}
+
 std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
   auto view = std::make_shared<LocalView>();
   view->landmarks.resize(static_cast<std::size_t>(config.capacity.view_landmarks));
@@ -60,7 +70,7 @@ std::shared_ptr<LocalView> roomy_view(const EstimatorConfig& config) {
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
-      map_(config.capacity, rig, config.landmarks.promote_parallax_rad),
+      map_(config.capacity, rig, map_options(config)),
       views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
       calibrator_(config.calibration, rig.cameras.front().camera),
@@ -248,7 +258,7 @@ void Mapper::count_virtual_points() {
 
 void Mapper::fuse(LandmarkHandle into, LandmarkHandle from) {
   // The other's measurements are of the other's patch: each is made anew with the patch that stays.
-  const std::vector<Observation> theirs = map_.landmarks()[from].observations;
+  const auto theirs = map_.landmarks()[from].observations;
   const std::uint32_t found = map_.landmarks()[from].found, visible = map_.landmarks()[from].visible;
   map_.remove_landmark(from);
   Landmark& l = map_.landmarks()[into];
@@ -544,6 +554,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
   view->keyframes.clear();
   view->landmarks.clear();
   view->reference_landmarks = 0;
+  view->reference_nearness = 0.0;
   view->map_keyframes = 0;
   view->median_depth = LocalView{}.median_depth;
   const Keyframe& centre = map_.keyframes()[reference];
@@ -593,9 +604,13 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       v.confirmed = l->state == LandmarkState::kFull ||
                     (l->state == LandmarkState::kWeak && l->observations.size() > 2);
       if (v.in_reference) {
-        if (v.confirmed) ++view->reference_landmarks;
         const double d =
             (T_reference_world.q * v.point_w.head<3>() + v.point_w[3] * T_reference_world.t).norm();
+        v.nearness = v.point_w[3] / std::max(d, 1e-9);
+        if (v.confirmed) {
+          ++view->reference_landmarks;
+          view->reference_nearness += v.nearness;
+        }
         depths.push_back(d / std::max(v.point_w[3], 1e-9));
       }
       view->landmarks.push_back(v);

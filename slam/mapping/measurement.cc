@@ -23,11 +23,11 @@ PredictionInput prediction_input(const Map& map, const Landmark& landmark) {
 bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark,
                          KeyframeHandle handle, std::size_t feature, Observation* out) {
   const Keyframe& keyframe = map.keyframes()[handle];
+  if (!keyframe.image) return false;
   const Camera& camera = map.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
   const Feature& f = keyframe.set.features[feature];
   const auto scale = static_cast<float>(std::pow(config.pyramid.scale_factor, f.level));
   *out = {handle, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, scale};
-  if (!keyframe.image) return false;
   Prediction p;
   if (!predict(prediction_input(map, landmark), camera, map.T_world_camera(keyframe).inverse(), 0.0, &p))
     return false;

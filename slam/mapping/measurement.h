@@ -8,10 +8,9 @@
 namespace farpoint::slam {
 
 // Aligns the landmark's patch with the keyframe's image, from corner `feature`. False where the keyframe has
-// no pixels any more or the patch is not there; *out is then the bare corner with a pixel of its level as
-// error.
+// no pixels any more or the patch is not there; *out then says nothing.
 [[nodiscard]] bool measure_observation(const EstimatorConfig& config, const Map& map,
-                                       const Landmark& landmark, KeyframeHandle keyframe, std::size_t feature,
+                                       const Landmark& landmark, KeyframeHandle handle, std::size_t feature,
                                        Observation* out);
 
 // What predict() needs of a landmark.

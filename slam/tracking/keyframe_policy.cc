@@ -2,6 +2,19 @@
 
 namespace farpoint::slam {
 
+namespace {
+
+// Across the way since the reference keyframe, of its landmarks, gone or not, were they all seen from the
+// side.
+double mean_parallax_px(const LocalView& view, const TrackOutcome& outcome) {
+  if (view.reference_landmarks == 0 || view.rig.cameras.empty()) return 0.0;
+  const double way = (outcome.T_world_body.t - view.T_world_reference.t).norm();
+  return view.rig.cameras.front().camera.focal_px() * way * view.reference_nearness /
+         view.reference_landmarks;
+}
+
+}  // namespace
+
 bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const TrackOutcome& outcome,
                     const KeyframeSituation& situation) {
   if (situation.frames_since_keyframe < 1 || !situation.mapping_free) return false;
@@ -12,9 +25,13 @@ bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const 
   const bool old = situation.frames_since_keyframe >= config.keyframes.max_interval_frames;
   const bool thin = outcome.reference_inliers < config.keyframes.tracked_ratio * view.reference_landmarks;
   const bool very_thin = outcome.reference_inliers < 0.5 * view.reference_landmarks;
+  // By number distant landmarks, which stay in the image, hide that the near ones, which hold the
+  // translation, have left it. Counted by nearness they do not; nor do they hide that the camera has moved.
+  const bool near_gone = outcome.reference_nearness < 0.5 * view.reference_nearness &&
+                         mean_parallax_px(view, outcome) > 0.25 * config.keyframes.min_parallax_px;
   // Standing still nothing is new, however old the keyframe; turning on the spot only what leaves the image
   // counts.
-  return moved || (old && drifted) || (thin && drifted) || very_thin;
+  return moved || (old && drifted) || (thin && drifted) || very_thin || near_gone;
 }
 
 }  // namespace farpoint::slam

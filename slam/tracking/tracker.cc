@@ -299,8 +299,10 @@ TrackOutcome Tracker::fine_pose(const Frame& frame, const SE3& start) {
   for (const Match& m : matches_) {
     if (!m.inlier) continue;
     if (m.aligned) ++out.aligned;
-    if (view_->landmarks[m.view_index].in_reference && view_->landmarks[m.view_index].confirmed)
-      ++out.reference_inliers;
+    const ViewLandmark& l = view_->landmarks[m.view_index];
+    if (!l.in_reference || !l.confirmed) continue;
+    ++out.reference_inliers;
+    out.reference_nearness += l.nearness;
   }
   out.ok = s.ok && s.inliers >= config_.tracking.min_inliers / 2;
   if (out.ok) out.median_motion_px = motion_since_reference(frame, s.T_world_body);

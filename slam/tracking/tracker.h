@@ -29,11 +29,12 @@ struct TrackOutcome {
   bool ok = false;  // a pose that may be used
   SE3 T_world_body;
   Matrix6d covariance = Matrix6d::Zero();
-  int matches = 0;               // after the local search
-  int inliers = 0, aligned = 0;  // of the final pose
-  int reference_inliers = 0;     // inliers among the reference keyframe's landmarks
-  int expected = 0;              // landmarks that project into the image
-  double median_motion_px = 0;   // of inliers against the reference keyframe, rotation taken out
+  int matches = 0;                // after the local search
+  int inliers = 0, aligned = 0;   // of the final pose
+  int reference_inliers = 0;      // inliers among the reference keyframe's landmarks
+  double reference_nearness = 0;  // theirs in sum
+  int expected = 0;               // landmarks that project into the image
+  double median_motion_px = 0;    // of inliers against the reference keyframe, rotation taken out
   double rms = 0;
 
   // A pose that a third of the matched landmarks contradict is not to be trusted. Rigid scenes show 0.7 and

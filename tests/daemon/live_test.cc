@@ -138,7 +138,9 @@ TEST_F(Live, FramesPastTheirDeadlineAreMarkedAndCounted) {
   config_.realtime.deadline_ms = 0.001;  // nobody keeps that
   config_.lcm.status_rate_hz = 100;      // with every frame
   ASSERT_EQ(run([this] { return frames_ >= 10; }), 0);
-  for (const auto& m : test::messages_of<timing_t>(options_.output, ipc::kTimingChannel)) {
+  const auto timing = test::messages_of<timing_t>(options_.output, ipc::kTimingChannel);
+  ASSERT_GE(timing.size(), 10U);
+  for (const timing_t& m : timing) {
     EXPECT_EQ(m.deadline_ms, 0.001);
     EXPECT_TRUE(m.deadline_missed);
   }

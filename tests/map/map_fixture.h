@@ -90,9 +90,10 @@ inline SE3 random_pose(Random* random) {
   return {so3_exp(random->vector(0.3)), random->vector(5.0)};
 }
 
-// The sighting of a feature where it is, with an error of 1 px.
+// The sighting of a feature where it is, with an error of 1 px; of a thinned keyframe's, somewhere.
 inline Observation sighting(const Map& map, KeyframeHandle keyframe, std::size_t feature) {
-  const Feature& f = map.keyframes()[keyframe].set.features[feature];
+  const std::vector<Feature>& features = map.keyframes()[keyframe].set.features;
+  const Feature f = feature < features.size() ? features[feature] : Feature{};
   return {keyframe, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 1.0F};
 }
 

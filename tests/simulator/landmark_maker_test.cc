@@ -67,7 +67,9 @@ class LandmarkMakerTest : public ::testing::Test {
     image_.noise.alike_alignment = 1.0;
     image_.width_px = 640, image_.height_px = 480;
     counts_ = {};
-    map_ = std::make_unique<slam::Map>(config_.capacity, rig_);
+    map_ = std::make_unique<slam::Map>(
+        config_.capacity, rig_,
+        slam::MapOptions{.wide_parallax_rad = config_.landmarks.promote_parallax_rad});
     maker_ = std::make_unique<slam::LandmarkMaker>(config_, map_.get(), &counts_);
     features_.clear();
     scaffold_.clear();

@@ -1,0 +1,51 @@
+// Memory for the landmarks' observations: taken and touched at the start, lent out in pieces of a few sizes,
+// and used again. More is taken from the heap only when all of it is lent.
+#pragma once
+
+#include <cstddef>
+#include <memory_resource>
+#include <vector>
+
+#include "slam/map/landmark.h"
+
+namespace farpoint::slam {
+
+// One block, given away from its beginning to its end, once; what it has no room for comes from the heap.
+class BlockThenHeap final : public std::pmr::memory_resource {
+ public:
+  explicit BlockThenHeap(std::size_t bytes) : block_(bytes) {}  // zeroed, hence touched
+
+  [[nodiscard]] std::size_t bytes() const { return block_.size(); }
+  [[nodiscard]] std::size_t heap_bytes() const { return heap_bytes_; }  // lent now
+
+ private:
+  void* do_allocate(std::size_t bytes, std::size_t alignment) override;
+  void do_deallocate(void* memory, std::size_t bytes, std::size_t alignment) override;
+  [[nodiscard]] bool do_is_equal(const memory_resource& other) const noexcept override {
+    return this == &other;
+  }
+
+  std::vector<std::byte> block_;
+  std::size_t given_ = 0, heap_bytes_ = 0;
+};
+
+class ObservationRoom {
+ public:
+  // For so many observations in all, in lists of so many at most.
+  ObservationRoom(std::size_t observations, std::size_t longest_list)
+      : whole_(observations * sizeof(Observation)),
+        pieces_({kPiecesAtOnce, longest_list * sizeof(Observation)}, &whole_) {}
+
+  [[nodiscard]] std::pmr::memory_resource* resource() { return &pieces_; }
+  [[nodiscard]] std::size_t bytes() const { return whole_.bytes(); }
+  [[nodiscard]] std::size_t heap_bytes() const { return whole_.heap_bytes(); }
+
+ private:
+  // Pieces of one size come so many at once: few enough that what is taken for a size is soon used.
+  static constexpr std::size_t kPiecesAtOnce = 64;
+
+  BlockThenHeap whole_;
+  std::pmr::unsynchronized_pool_resource pieces_;
+};
+
+}  // namespace farpoint::slam
