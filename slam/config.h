@@ -88,7 +88,7 @@ struct CalibrationConfig {
   double focal_sigma = 0.003;  // relative
   double centre_sigma_px = 2.0;
   double distortion_sigma = 0.02;   // of the first radial coefficient
-  double information_share = 0.25;  // residuals are not independent: so much of their information counts
+  double information_share = 0.05;  // residuals are not independent: so much of their information counts
   int min_keyframes = 8;            // free poses a window must have
 };
 

@@ -28,9 +28,10 @@ constexpr std::size_t kViews = 5;
 // pixels, a surface that is not as flat as it was taken for. That part, so large (1 sigma), does not average
 // out.
 constexpr double kPatchSigma_px = 0.2;
-// What stays a virtual point is far away, and may move by itself in the seconds that it is seen: clouds drift
-// by 1 to 2 mrad a second. In the whole of its measurements that looks like parallax, a hundred clouds look
-// like a vehicle that is slower than it is, and the scale gave way to them by up to 4 %.
+// What shows no wide parallax is far away, or moves by itself in the seconds that it is seen: clouds drift by
+// 1 to 2 mrad a second, a car ahead keeps its place in the image. In the whole of its measurements that looks
+// like parallax, a hundred clouds look like a vehicle that is slower than it is, and the scale gave way to
+// them by up to 4 %.
 constexpr double kOwnMotion_rad = 0.003;
 
 // n measurements of independent errors sigma and one common error s know their mean to sigma^2 / n + s^2: as
@@ -429,8 +430,7 @@ void Mapper::build_problem() {
     if (point.measurements == 0) continue;
     const double own_motion_px =
         kOwnMotion_rad * map_.rig().cameras[static_cast<std::size_t>(l.host_camera)].camera.focal_px();
-    point.weight = shared_error_weight(problem_, point,
-                                       l.state == LandmarkState::kBearing ? own_motion_px : kPatchSigma_px);
+    point.weight = shared_error_weight(problem_, point, !map_.is_wide(l) ? own_motion_px : kPatchSigma_px);
     problem_.points.push_back(point);
     problem_landmarks_[kept++] = lh;
   }
