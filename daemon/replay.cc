@@ -1,9 +1,12 @@
 #include "daemon/replay.h"
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include <memory>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 #include "daemon/build_info.h"
 #include "daemon/errors.h"
@@ -31,9 +34,16 @@ std::unique_ptr<Session> session_of(const Config& config, const LogFrameSource& 
   }
 }
 
-// Puts the outputs in their place and prints the last line. Returns the exit status.
+std::string stopped_by(int signal, const char* when) {
+  return fmt::format("stopped by signal {} {}", signal, when);
+}
+
+// Puts the outputs in their place and prints the last line. Returns the exit status. A replay that a signal
+// stopped ends like one whose log is over, and says so.
 int conclude(const Options& options, const LogFrameSource& source, std::int64_t frames_dropped,
              std::vector<double> cpu_ms, Session* session, Outputs* outputs) {
+  const int signal = StopOnSignal::signal();
+  if (session == nullptr) throw std::runtime_error(stopped_by(signal, "before the first image"));
   const RunEnd& end = session->finish(source.counts());
   const std::vector<std::string> written = outputs->close(end);
   const ipc::LogDamage& damage = source.damage();
@@ -47,6 +57,11 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
   }
   std::fprintf(line_stream(options), "%s\n",
                last_line(end, source.counts(), frames_dropped, std::move(cpu_ms), written).c_str());
+  if (signal != 0) {
+    std::fprintf(stderr, "farpointd: %s\n",
+                 stopped_by(signal, "before the end of the log; what came until then was replayed").c_str());
+    return 1;
+  }
   return damage.cut_off ? 2 : 0;
 }
 
@@ -61,8 +76,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
   Progress progress;
   StageClock clock;
   SourceFrame frame;
-  while (source.next(&frame, &clock)) {
-    StopOnSignal::check();
+  while (StopOnSignal::signal() == 0 && source.next(&frame, &clock)) {
     if (!session) {
       session = session_of(config, source, &outputs, schedule ? "recorded" : "lockstep", schedule != nullptr);
     }
@@ -80,7 +94,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
     clock.new_frame();
   }
   progress.clear();
-  if (schedule != nullptr) schedule->check_end();
+  if (schedule != nullptr && StopOnSignal::signal() == 0) schedule->check_end();
   return conclude(options, source, frames_dropped, std::move(cpu_ms), session.get(), &outputs);
 }
 
@@ -104,7 +118,6 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   ThreadHooks all_hooks = hooks;
   all_hooks.on_started = [&] { realtime.print(); };
   pipeline.run(all_hooks);
-  StopOnSignal::check();
   return conclude(options, source, pipeline.frames_dropped(), pipeline.take_tracking_cpu_ms(), session.get(),
                   &outputs);
 }

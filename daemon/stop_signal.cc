@@ -1,7 +1,5 @@
 #include "daemon/stop_signal.h"
 
-#include <spdlog/fmt/fmt.h>
-
 namespace farpoint::daemon {
 namespace {
 
@@ -47,11 +45,6 @@ bool ReloadOnSignal::take() {
   if (reload_asked == 0) return false;
   reload_asked = 0;
   return true;
-}
-
-void StopOnSignal::check() {
-  if (stop_signal != 0)
-    throw std::runtime_error(fmt::format("stopped by signal {}, no output written", int{stop_signal}));
 }
 
 }  // namespace farpoint::daemon

@@ -1,8 +1,7 @@
-// SIGINT and SIGTERM end a run between two frames, so that no temporary file is left behind.
+// SIGINT and SIGTERM end a run between two frames, in order: what was worked out until then is written.
 #pragma once
 
 #include <csignal>
-#include <stdexcept>
 
 namespace farpoint::daemon {
 
@@ -17,8 +16,6 @@ class StopOnSignal {
   [[nodiscard]] static int signal();
   // As if SIGTERM had come.
   static void ask();
-  // Throws std::runtime_error where one came.
-  static void check();
 
  private:
   using Handler = void (*)(int);
