@@ -52,6 +52,10 @@ struct LogReader::Header {
 LogReader::LogReader(const std::string& path) : buffer_(2 * kReadBytes) {
   owns_fd_ = path != "-";
   fd_ = owns_fd_ ? open_log(path) : STDIN_FILENO;
+  // A pipe holds 64 kB, less than an image: whoever writes and we would take turns. Where it is none, or the
+  // system allows no more, it stays as it is.
+  constexpr int kPipeBytes = 1 << 20;
+  if (!owns_fd_) (void)fcntl(fd_, F_SETPIPE_SZ, kPipeBytes);
 }
 
 LogReader::~LogReader() {
