@@ -77,6 +77,7 @@ struct CanConfig {
   bool enabled = false;  // live
   std::string interface = "can0";
   CanPoseFrame frame = CanPoseFrame::kMap;
+  bool fd = false;
   double rate_hz = 0;  // live; 0: with each image only
   std::string wheels_dbc = "none", wheel_signals = "none";
 };

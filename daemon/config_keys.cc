@@ -119,6 +119,7 @@ std::vector<ConfigKey> make_keys() {
       boolean("can.enabled", FIELD(can.enabled)),
       text("can.interface", FIELD(can.interface)),
       enumeration("can.frame", {"map", "odom"}, FIELD(can.frame)),
+      boolean("can.fd", FIELD(can.fd)),
       number("can.rate_hz", "Hz", 0, 1000, FIELD(can.rate_hz)),
       text("can.wheels_dbc", FIELD(can.wheels_dbc)),
       text("can.wheel_signals", FIELD(can.wheel_signals)),

@@ -67,7 +67,8 @@ void Outputs::open_files(const Config& config) {
   }
   if (!options_.live_trajectory.empty()) live_ = std::make_unique<LiveTrajectory>(options_.live_trajectory);
   if (!options_.can_log.empty()) {
-    make_can(config)->log_to(std::make_unique<ipc::CandumpWriter>(options_.can_log, bus_name(config)));
+    make_can(config)->log_to(
+        std::make_unique<ipc::CandumpWriter>(options_.can_log, bus_name(config), config.can.fd));
   }
   // Written at the end only: find out now whether that will be possible.
   if (!options_.trajectory.empty()) ipc::ReplacedPath probe(options_.trajectory);
@@ -103,6 +104,7 @@ void Outputs::open_bus(const Config& config) {
 
 drivers::CanOptions Outputs::read_wheels(const Config& config) {
   drivers::CanOptions options;
+  options.fd = config.can.fd;
   options.wait_for_interface = use_ == Use::kLive;
   if (use_ != Use::kLive || config.can.wheels_dbc == "none" || config.can.wheel_signals == "none")
     return options;

@@ -4,6 +4,7 @@
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -70,7 +71,8 @@ std::int64_t age_us_of(msghdr* message) {
   return age_us < 0 || age_us > kOldest_us ? 0 : age_us;
 }
 
-bool take(int fd, can_frame* frame, std::int64_t* age_us) {
+// A classic frame is the beginning of a CAN FD frame: identifier, length, flags, data.
+bool take(int fd, canfd_frame* frame, std::int64_t* age_us) {
   alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timeval))> control{};
   iovec data{frame, sizeof *frame};
   msghdr message{};
@@ -78,17 +80,29 @@ bool take(int fd, can_frame* frame, std::int64_t* age_us) {
   message.msg_iovlen = 1;
   message.msg_control = control.data();
   message.msg_controllen = control.size();
-  if (recvmsg(fd, &message, 0) != static_cast<ssize_t>(sizeof *frame)) return false;
+  const ssize_t got = recvmsg(fd, &message, 0);
+  if (got != CAN_MTU && got != CANFD_MTU) return false;
   *age_us = age_us_of(&message);
   return true;
 }
 
-can_frame to_kernel(const ipc::CanFrame& frame) {
-  can_frame out{};
+canfd_frame to_kernel(const ipc::CanFrame& frame, bool fd) {
+  canfd_frame out{};
   out.can_id = frame.id & CAN_SFF_MASK;
-  out.len = std::min<std::uint8_t>(frame.size, CAN_MAX_DLEN);
+  out.len = std::min<std::uint8_t>(frame.size, fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN);
+  if (fd) out.flags = CANFD_BRS;
   std::copy_n(frame.data.begin(), out.len, out.data);
   return out;
+}
+
+// 0, or errno: the interface's frames must have room for CAN FD's.
+int turn_on_fd(int fd, const std::string& interface) {
+  const int on = 1;
+  if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) != 0) return errno;
+  ifreq request{};
+  interface.copy(request.ifr_name, sizeof request.ifr_name - 1);
+  if (ioctl(fd, SIOCGIFMTU, &request) != 0) return errno;
+  return request.ifr_mtu == CANFD_MTU ? 0 : EMSGSIZE;
 }
 
 }  // namespace
@@ -124,6 +138,8 @@ SocketCan::SocketCan(const std::string& interface, const CanOptions& options)
   close_socket();
   if (!kernel_has_can) fail(interface, "this kernel has no CAN (modules can and can_raw are needed)");
   if (absent && options.wait_for_interface) return;
+  if (error == EMSGSIZE)
+    fail(interface, "it has no CAN FD (can.fd; see: ip link set " + interface + " type can fd on)");
   fail(interface, absent ? "no such interface (see: ip link show type can)" : std::strerror(error));
 }
 
@@ -146,6 +162,7 @@ int SocketCan::open_and_bind() {
   address.can_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
   state_ = CanState::kAbsent;
   if (address.can_ifindex == 0) return ENODEV;
+  if (const int error = options_.fd ? turn_on_fd(fd_, interface_) : 0; error != 0) return error;
   if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return errno;
   bound_ = true;
   state_ = CanState::kUnknown;
@@ -194,8 +211,9 @@ bool SocketCan::send_one(const ipc::CanFrame& frame) {
     note_failure(ENODEV);
     return false;
   }
-  const can_frame out = to_kernel(frame);
-  if (write(fd_, &out, sizeof out) != static_cast<ssize_t>(sizeof out)) {
+  const canfd_frame out = to_kernel(frame, options_.fd);
+  const std::size_t bytes = options_.fd ? CANFD_MTU : CAN_MTU;
+  if (write(fd_, &out, bytes) != static_cast<ssize_t>(bytes)) {
     note_failure(errno);
     return false;
   }
@@ -205,13 +223,13 @@ bool SocketCan::send_one(const ipc::CanFrame& frame) {
 }
 
 bool SocketCan::receive(ipc::CanFrame* frame, std::int64_t* age_us) {
-  can_frame in{};
+  canfd_frame in{};
   while (bound_ && take(fd_, &in, age_us)) {
     if ((in.can_id & CAN_ERR_FLAG) != 0) {
       take_error_frame(in.can_id & CAN_ERR_MASK, in.data);
       continue;
     }
-    if ((in.can_id & (CAN_RTR_FLAG | CAN_EFF_FLAG)) != 0 || in.len > CAN_MAX_DLEN) continue;
+    if ((in.can_id & (CAN_RTR_FLAG | CAN_EFF_FLAG)) != 0 || in.len > CANFD_MAX_DLEN) continue;
     frame->id = in.can_id & CAN_SFF_MASK;
     frame->size = in.len;
     frame->data.fill(0);

@@ -18,7 +18,7 @@ enum class CanState : std::uint8_t {
   kPassive = 3,  // it may not disturb the bus any more
   kBusOff = 4,   // it takes no part until it is started again (restart-ms)
   kDown = 5,     // the interface is down
-  kAbsent = 6,   // there is no such interface
+  kAbsent = 6,   // there is no such interface, or it cannot do CAN FD and is to
 };
 [[nodiscard]] const char* to_string(CanState state);
 
@@ -36,6 +36,8 @@ struct CanOptions {
   std::vector<std::uint32_t> wanted_ids;
   // Whether an interface that is not there yet is waited for, or an error.
   bool wait_for_interface = false;
+  // Frames are sent as CAN FD's, with the faster bit rate in their data, and such frames are received too.
+  bool fd = false;
 };
 
 class SocketCan {

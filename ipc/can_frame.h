@@ -1,4 +1,4 @@
-// One classic CAN frame, apart from linux/can.h so that codec and logs build anywhere.
+// One CAN frame, apart from linux/can.h so that codec and logs build anywhere.
 #pragma once
 
 #include <array>
@@ -8,8 +8,8 @@ namespace farpoint::ipc {
 
 struct CanFrame {
   std::uint32_t id = 0;   // 11 bits
-  std::uint8_t size = 8;  // bytes of data, 0..8
-  std::array<std::uint8_t, 8> data{};
+  std::uint8_t size = 8;  // bytes of data: classic 0..8, CAN FD 0..64
+  std::array<std::uint8_t, 64> data{};
 };
 
 }  // namespace farpoint::ipc

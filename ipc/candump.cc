@@ -11,6 +11,7 @@ namespace {
 constexpr std::int64_t kMicrosPerSecond = 1'000'000;
 constexpr std::size_t kMicrosDigits = 6;
 constexpr std::uint32_t kMaxId = 0x7ff;
+constexpr std::size_t kMaxClassicBytes = 8;
 
 // All of the text as a number, else false.
 template <typename Number>
@@ -36,7 +37,7 @@ bool parse_frame(std::string_view text, CanFrame* frame) {
   if (hash != 3) return false;  // 8 digits are an extended identifier
   const std::string_view bytes = text.substr(hash + 1);
   if (!parse_number(text.substr(0, hash), 16, &frame->id) || frame->id > kMaxId) return false;
-  if (bytes.size() % 2 != 0 || bytes.size() / 2 > frame->data.size()) return false;
+  if (bytes.size() % 2 != 0 || bytes.size() / 2 > kMaxClassicBytes) return false;
   frame->size = static_cast<std::uint8_t>(bytes.size() / 2);
   frame->data.fill(0);
   for (std::size_t i = 0; i < frame->size; ++i) {
@@ -47,13 +48,14 @@ bool parse_frame(std::string_view text, CanFrame* frame) {
 
 }  // namespace
 
-CandumpWriter::CandumpWriter(std::string path, std::string interface)
-    : file_(std::move(path)), interface_(std::move(interface)) {}
+CandumpWriter::CandumpWriter(std::string path, std::string interface, bool fd)
+    : file_(std::move(path)), interface_(std::move(interface)), separator_(fd ? "##1" : "#") {}
 
 void CandumpWriter::write(std::int64_t utime, std::span<const CanFrame> frames) {
   for (const CanFrame& frame : frames) {
-    std::fprintf(file_.stream(), "(%010" PRId64 ".%06" PRId64 ") %s %03" PRIX32 "#", utime / kMicrosPerSecond,
-                 utime % kMicrosPerSecond, interface_.c_str(), frame.id);
+    std::fprintf(file_.stream(), "(%010" PRId64 ".%06" PRId64 ") %s %03" PRIX32 "%s",
+                 utime / kMicrosPerSecond, utime % kMicrosPerSecond, interface_.c_str(), frame.id,
+                 separator_);
     for (std::size_t i = 0; i < frame.size; ++i) std::fprintf(file_.stream(), "%02X", frame.data[i]);
     std::fputc('\n', file_.stream());
   }

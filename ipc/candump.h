@@ -1,4 +1,5 @@
-// CAN logs in the format of `candump -L`: "(seconds.micros) interface ID#HEXDATA".
+// CAN logs in the format of `candump -L`: "(seconds.micros) interface ID#HEXDATA", CAN FD frames with
+// "ID##1HEXDATA".
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,8 @@ namespace farpoint::ipc {
 class CandumpWriter {
  public:
   // "-" is standard output. Throws std::runtime_error naming the file where it cannot be written.
-  CandumpWriter(std::string path, std::string interface);
+  // fd: the frames are CAN FD's, with the faster bit rate in their data.
+  CandumpWriter(std::string path, std::string interface, bool fd = false);
 
   // One line a frame, all with this time. Precondition: utime >= 0.
   void write(std::int64_t utime, std::span<const CanFrame> frames);
@@ -24,6 +26,7 @@ class CandumpWriter {
  private:
   OutputFile file_;
   std::string interface_;
+  const char* separator_;  // between identifier and data
 };
 
 struct CandumpLine {

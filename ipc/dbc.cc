@@ -1,6 +1,7 @@
 #include "ipc/dbc.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <charconv>
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kMaxStandardId = 0x7ff;
+constexpr unsigned kMaxFrameBytes = std::tuple_size_v<decltype(CanFrame::data)>;  // CAN FD's
 
 // Takes a line apart from its front.
 class Scanner {
@@ -94,7 +96,7 @@ unsigned position_of(const DbcSignal& d, unsigned i) {
 }
 
 bool fits(const DbcSignal& d) {
-  if (d.length == 0 || d.length > 64 || d.size == 0 || d.size > 8 || d.start >= 8 * d.size) return false;
+  if (d.length == 0 || d.length > 64 || d.start >= 8 * d.size) return false;
   for (unsigned i = 0; i < d.length; ++i)
     if (position_of(d, i) >= 8 * d.size) return false;
   return true;
@@ -145,6 +147,9 @@ DbcSignal read_dbc_signal(const std::string& path, const std::string& message, c
     if (!read_layout(s, &found))
       fail("signal " + signal + ": expected 'SG_ " + signal +
            " : start|length@order sign (factor,offset) [min|max] \"unit\"'");
+    if (found.size == 0 || found.size > kMaxFrameBytes)
+      fail("message " + message + " has " + std::to_string(found.size) + " bytes, expected 1 to " +
+           std::to_string(kMaxFrameBytes));
     if (!fits(found))
       fail("signal " + signal + " lies outside its frame of " + std::to_string(found.size) + " bytes");
     return found;

@@ -41,10 +41,12 @@ TEST(SocketCan, AnErrorSaysWhatIsMissing) {
 // The other end of the socket stands for the bus.
 class SocketCanPair : public testing::Test {
  protected:
-  SocketCanPair() {
+  SocketCanPair() { open({}); }
+  void open(const CanOptions& options) {
+    if (bus_ >= 0) close(bus_);
     std::array<int, 2> ends{};
     EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, ends.data()), 0);
-    can_ = std::make_unique<SocketCan>(ends[0], CanOptions{});
+    can_ = std::make_unique<SocketCan>(ends[0], options);
     bus_ = ends[1];
   }
   void TearDown() override {
@@ -84,6 +86,40 @@ TEST_F(SocketCanPair, FramesGoThroughBothWays) {
   EXPECT_EQ(frame.id, 0x120U);
   EXPECT_EQ(frame.size, 4);
   EXPECT_FALSE(can_->receive(&frame, &age_us));  // extended: passed over
+}
+
+TEST_F(SocketCanPair, CanFdFramesGoThroughBothWaysBesideClassicOnes) {
+  CanOptions options;
+  options.fd = true;
+  open(options);
+  const std::array<ipc::CanFrame, 1> frames{{{0x301, 8, {1, 2, 3}}}};
+  EXPECT_TRUE(can_->send(frames));
+  canfd_frame got{};
+  ASSERT_EQ(read(bus_, &got, sizeof got), static_cast<ssize_t>(CANFD_MTU));
+  EXPECT_EQ(got.can_id, 0x301U);
+  EXPECT_EQ(got.len, 8);
+  EXPECT_EQ(got.flags & CANFD_BRS, CANFD_BRS);
+  EXPECT_EQ(got.data[2], 3);
+
+  ipc::CanFrame frame;
+  std::int64_t age_us = 0;
+  got.can_id = 0x123;
+  got.len = 64;
+  got.data[63] = 7;
+  ASSERT_EQ(write(bus_, &got, CANFD_MTU), static_cast<ssize_t>(CANFD_MTU));
+  ASSERT_TRUE(can_->receive(&frame, &age_us));
+  EXPECT_EQ(frame.size, 64);
+  EXPECT_EQ(frame.data[63], 7);
+  can_frame classic{};
+  classic.can_id = 0x124;
+  classic.len = 2;
+  classic.data[1] = 9;
+  ASSERT_EQ(write(bus_, &classic, sizeof classic), static_cast<ssize_t>(sizeof classic));
+  ASSERT_TRUE(can_->receive(&frame, &age_us));
+  EXPECT_EQ(frame.id, 0x124U);
+  EXPECT_EQ(frame.size, 2);
+  EXPECT_EQ(frame.data[1], 9);
+  EXPECT_EQ(frame.data[63], 0);  // nothing is left of the frame before
 }
 
 TEST_F(SocketCanPair, AFrameHasTheTimeAtWhichItArrivedNotThatAtWhichItIsRead) {

@@ -25,6 +25,22 @@ TEST(Candump, WritesTheKnownFormat) {
             "(1436509052.249713) can0 012#DEAD0001020304FF\n(0000000000.000000) can0 012#DEAD\n");
 }
 
+TEST(Candump, CanFdFramesHaveTheirOwnSign) {
+  const test::Scratch scratch;
+  CandumpWriter writer(scratch.path("a.candump"), "can0", true);
+  CanFrame frame;
+  frame.id = 0x301;
+  frame.size = 12;
+  frame.data[11] = 0xab;
+  writer.write(1'000'000, {&frame, 1});
+  writer.close();
+  const auto bytes = test::read_bytes(scratch.path("a.candump"));
+  const std::string line(bytes.begin(), bytes.end());
+  EXPECT_EQ(line, "(0000000001.000000) can0 301##10000000000000000000000AB\n");
+  CandumpLine parsed;
+  EXPECT_FALSE(parse_candump_line(line, &parsed));
+}
+
 TEST(Candump, ReadsWhatItWrote) {
   const test::Scratch scratch;
   std::mt19937_64 rng(1);

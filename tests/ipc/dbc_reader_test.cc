@@ -21,7 +21,11 @@ constexpr const char* kText =
     "BO_ 2147484000 Far: 8 ABS\n"
     " SG_ X : 0|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
     "BO_ 292 Other: 4 ABS\n"
-    " SG_ FrontLeft : 0|8@1- (1,-3) [0|0] \"\"  Vector__XXX\n";
+    " SG_ FrontLeft : 0|8@1- (1,-3) [0|0] \"\"  Vector__XXX\n"
+    "BO_ 293 Long: 64 ABS\n"
+    " SG_ Last : 496|16@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
+    "BO_ 294 TooLong: 65 ABS\n"
+    " SG_ First : 0|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n";
 
 class DbcText : public testing::Test {
  protected:
@@ -58,6 +62,14 @@ TEST_F(DbcText, OfTwoSignalsOfANameThatOfTheMessage) {
   const DbcSignal other = read_dbc_signal(path_, "Other", "FrontLeft");
   EXPECT_EQ(other.id, 292U);
   EXPECT_NEAR(other.value({292, 4, {0xFF}}), -4.0, 1e-9);
+}
+
+TEST_F(DbcText, CanFdMessagesAreLonger) {
+  CanFrame frame{293, 64, {}};
+  frame.data[62] = 0x34;
+  frame.data[63] = 0x12;
+  EXPECT_NEAR(read_dbc_signal(path_, "Long", "Last").value(frame), 4660.0, 1e-9);
+  EXPECT_EQ(complaint("TooLong", "First"), path_ + ":15: message TooLong has 65 bytes, expected 1 to 64");
 }
 
 TEST_F(DbcText, WhatIsNoValueIsNaN) {

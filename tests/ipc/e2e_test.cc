@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <set>
 
@@ -12,7 +13,7 @@ constexpr std::uint16_t kDataId = 0x123;
 
 CanFrame protected_frame(std::uint8_t counter, std::array<std::uint8_t, 8> data = {}) {
   CanFrame frame;
-  frame.data = data;
+  std::copy(data.begin(), data.end(), frame.data.begin());
   e2e_protect(&frame, kDataId, counter);
   return frame;
 }
@@ -32,8 +33,8 @@ std::uint8_t slow_crc(const CanFrame& frame, std::uint16_t data_id) {
 }
 
 TEST(E2e, Vectors) {
-  EXPECT_EQ(protected_frame(0).data, (std::array<std::uint8_t, 8>{0xcc, 0, 0, 0, 0, 0, 0, 0}));
-  EXPECT_EQ(protected_frame(1).data, (std::array<std::uint8_t, 8>{0x91, 1, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(protected_frame(0).data, (std::array<std::uint8_t, 64>{0xcc, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(protected_frame(1).data, (std::array<std::uint8_t, 64>{0x91, 1, 0, 0, 0, 0, 0, 0}));
 }
 
 TEST(E2e, AgreesWithABitwiseCrc) {
