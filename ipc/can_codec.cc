@@ -163,8 +163,8 @@ Packer content(CanMessage message, const OdometryEpoch& epoch, const Available& 
 
 }  // namespace
 
-EulerAngles euler_angles(const std::array<double, 4>& q) {
-  const auto& [w, x, y, z] = q;
+EulerAngles euler_angles(const std::array<double, 4>& orientation_wxyz) {
+  const auto& [w, x, y, z] = orientation_wxyz;
   EulerAngles out;
   out.heading_rad = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
   out.pitch_rad = std::asin(std::clamp(2 * (w * y - x * z), -1.0, 1.0));

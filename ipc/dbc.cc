@@ -105,7 +105,7 @@ bool fits(const DbcSignal& d) {
 }  // namespace
 
 double DbcSignal::value(const CanFrame& frame) const {
-  if (frame.id != id || frame.size < size) return kNan;
+  if (frame.id != id || frame.size < size || length == 0) return kNan;
   std::uint64_t raw = 0;
   for (unsigned i = 0; i < length; ++i) {
     const unsigned bit = position_of(*this, i);
