@@ -58,8 +58,7 @@ class Packer {
   [[nodiscard]] CanFrame frame(CanMessage message, std::uint8_t counter) const {
     CanFrame out;
     out.id = can_id(message);
-    for (std::size_t i = 0; i < out.size; ++i)
-      out.data[i] = static_cast<std::uint8_t>(payload_ >> (8 * i));
+    for (std::size_t i = 0; i < out.size; ++i) out.data[i] = static_cast<std::uint8_t>(payload_ >> (8 * i));
     e2e_protect(&out, can_data_id(message), counter);
     return out;
   }

@@ -49,9 +49,8 @@ struct LogReader::Header {
   [[nodiscard]] std::size_t event_bytes() const { return kHeaderBytes + channel_bytes + data_bytes; }
 };
 
-LogReader::LogReader(const std::string& path) : buffer_(2 * kReadBytes) {
-  owns_fd_ = path != "-";
-  fd_ = owns_fd_ ? open_log(path) : STDIN_FILENO;
+LogReader::LogReader(const std::string& path)
+    : fd_(path != "-" ? open_log(path) : STDIN_FILENO), owns_fd_(path != "-"), buffer_(2 * kReadBytes) {
   // A pipe holds 64 kB, less than an image: whoever writes and we would take turns. Where it is none, or the
   // system allows no more, it stays as it is.
   constexpr int kPipeBytes = 1 << 20;
@@ -163,11 +162,11 @@ bool LogReader::next(LogEvent* event) {
   return false;
 }
 
-LogWriter::LogWriter(const std::string& path) : path_(path) {
-  channel_.reserve(LogReader::kMaxChannelBytes);
-  log_ = lcm_eventlog_create(path_.writable().c_str(), "w");
+LogWriter::LogWriter(const std::string& path)
+    : path_(path), log_(lcm_eventlog_create(path_.writable().c_str(), "w")) {
   if (log_ == nullptr)
     throw std::runtime_error("cannot write log " + path_.target() + ": " + std::strerror(errno));
+  channel_.reserve(LogReader::kMaxChannelBytes);
 }
 
 LogWriter::~LogWriter() {
@@ -183,7 +182,8 @@ bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us,
   event.channellen = static_cast<std::int32_t>(channel_.size());
   event.datalen = static_cast<std::int32_t>(data.size());
   event.channel = channel_.data();
-  event.data = const_cast<std::uint8_t*>(data.data());  // LCM's API is not const; it only reads
+  // LCM's API is not const; it only reads.
+  event.data = const_cast<std::uint8_t*>(data.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   if (lcm_eventlog_write_event(log_, &event) != 0) {
     error_ = std::strerror(errno);
     return false;

@@ -200,8 +200,7 @@ void Tracker::align_matches(const Frame& frame, const std::vector<Candidate>& ca
   for (std::size_t i = 0; i < candidates.size(); ++i)
     candidate_of_[candidates[i].view_index] = static_cast<std::int32_t>(i);
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < matches_.size(); ++i) {
-    Match m = matches_[i];
+  for (Match m : matches_) {
     const std::int32_t index = candidate_of_[m.view_index];
     if (index < 0) continue;
     const Candidate& c = candidates[static_cast<std::size_t>(index)];
@@ -379,7 +378,7 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
       pair_around(frame, *s.around, radius_px, s.among);
     else
       pair_anywhere(frame, s.among);
-    const TrackOutcome out = pose_from_pairs(frame);
+    TrackOutcome out = pose_from_pairs(frame);
     if (out.ok) return out;
   }
   return {};
@@ -440,7 +439,7 @@ TrackOutcome Tracker::pose_from_pairs(const Frame& frame) {
     if (!camera.camera.unproject({f.u_px, f.v_px}, &bearing)) return true;
     const Eigen::Vector4d& point = view_->landmarks[p.view_index].point_w;
     bearings_.push_back(bearing);
-    points_.push_back(point.head<3>() / point[3]);
+    points_.emplace_back(point.head<3>() / point[3]);
     return false;
   });
   const PnpResult& pnp = solve_pnp(bearings_, points_, 2.0 / camera.camera.focal_px(), PnpOptions{}, &pnp_);

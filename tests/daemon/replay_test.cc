@@ -1,8 +1,8 @@
 // The whole daemon by replay: what goes in wrong, what comes out, and that it comes out the same.
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <csignal>
 
 #include <cmath>
 #include <filesystem>

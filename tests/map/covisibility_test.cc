@@ -65,6 +65,7 @@ class ShortLists : public WideCovisibility {
 
 TEST_F(ShortLists, KeepTheStrongest) {
   std::vector<KeyframeHandle> k;
+  k.reserve(5);
   for (int i = 0; i < 5; ++i) k.push_back(keyframe());
   const auto names = [&](int i) {
     std::vector<KeyframeHandle> list;

@@ -76,8 +76,10 @@ class LandmarkMakerTest : public ::testing::Test {
     scaffold_landmarks_.clear();
     frames_ = 0;
     // A dozen points 20 m away tell the maker how deep the scene is.
-    for (std::uint32_t i = 0; i < 12; ++i)
-      scaffold_.push_back({kScaffold + i, {-6.0 + 4.0 * (i % 4), -4.0 + 4.0 * (i / 4), 20.0}});
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      const std::uint32_t column = i % 4, row = i / 4;
+      scaffold_.push_back({kScaffold + i, {-6.0 + 4.0 * column, -4.0 + 4.0 * row, 20.0}});
+    }
   }
 
   // A keyframe at the pose that sees these corners, exactly, and the scaffold.
@@ -101,7 +103,7 @@ class LandmarkMakerTest : public ::testing::Test {
       k.set.descriptors.push_back(descriptor_of(c));
       Vector3d bearing;
       EXPECT_TRUE(rig_.cameras[0].camera.unproject(pixel, &bearing));
-      k.bearings.push_back(bearing.cast<float>());
+      k.bearings.emplace_back(bearing.cast<float>());
       visible.push_back({c.id, c.group, pixel.cast<float>()});
       payloads.push_back({c.id, frames_, 0.0F, 0.0F, c.group});
     }
@@ -339,6 +341,7 @@ TEST_F(LandmarkMakerTest, OnesThatOnlyLookAlikeDoNotMerge) {
 
 TEST_F(LandmarkMakerTest, ASightingOfSomethingElseIsDroppedAgain) {
   std::vector<KeyframeHandle> seen;
+  seen.reserve(4);
   Corner one = kFar;
   one.group = 7;
   for (int i = 0; i < 4; ++i) seen.push_back(look(0.5 * i, {one}));
@@ -359,6 +362,7 @@ TEST_F(LandmarkMakerTest, ASightingOfSomethingElseIsDroppedAgain) {
 
 TEST_F(LandmarkMakerTest, OneThatFailsAgainAndAgainIsRejected) {
   std::vector<KeyframeHandle> seen;
+  seen.reserve(4);
   Corner one = kFar;
   one.group = 7;
   for (int i = 0; i < 4; ++i) seen.push_back(look(0.5 * i, {one}));
