@@ -1,5 +1,6 @@
 #include "slam/mapping/bundle_problem.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -139,6 +140,17 @@ void evaluate_bundle(BundleProblem* problem) {
     }
     point.inverse_depth_sigma = information > 0.0 ? 1.0 / std::sqrt(information) : 1e6;
   }
+}
+
+double mean_chi2(const BundleProblem& problem) {
+  double sum = 0.0, weight = 0.0;
+  for (const BundleProblem::Point& point : problem.points)
+    for (int i = 0; i < point.measurements; ++i) {
+      const auto index = static_cast<std::size_t>(point.first_measurement + i);
+      sum += point.weight * std::min(problem.measurements[index].chi2, kLargestChi2);
+      weight += point.weight;
+    }
+  return weight > 0.0 ? sum / weight : 0.0;
 }
 
 }  // namespace farpoint::slam

@@ -522,15 +522,12 @@ void Mapper::update_settling(double scale_change) {
 }
 
 bool Mapper::consistent() const {
-  // Mean chi-square of a measurement (two degrees of freedom), outliers cut off. The floor of an aligned
-  // measurement's sigma (tracking.pixel_sigma_px) is about twice the error seen on rigid scenes with a global
-  // shutter, so that a sound map shows 0.4 to 0.9; one that rolling shutter has bent shows 1.5 to 3.
-  constexpr double kCutOff = 20.0;
-  constexpr double kConsistent = 1.2;
-  if (problem_.measurements.empty()) return true;
-  double sum = 0.0;
-  for (const BundleProblem::Measurement& m : problem_.measurements) sum += std::min(m.chi2, kCutOff);
-  return sum < kConsistent * static_cast<double>(problem_.measurements.size());
+  // The floor of an aligned measurement's sigma (tracking.pixel_sigma_px) is about twice the error seen on
+  // rigid scenes with a global shutter, so that a sound map shows 0.4 to 0.9; one that rolling shutter has
+  // bent shows 1.1 to 2.1. Clouds and far trees that move by themselves are many, but have little say. What
+  // held before may waver.
+  constexpr double kSound = 1.0, kStillSound = 1.1;
+  return mean_chi2(problem_) <= (settled_ ? kStillSound : kSound);
 }
 
 void Mapper::retire_map(std::int32_t map_id) {
