@@ -66,7 +66,7 @@ struct LandmarkConfig {
   LandmarkMode mode = LandmarkMode::kVmp;
   double promote_parallax_rad = 0.020;   // largest parallax: acos(0.9998), as in the paper
   double promote_relative_sigma = 0.05;  // vmp: sigma(inverse depth) / inverse depth
-  int bearing_observations = 3;          // vmp: sightings from which a virtual point takes part in poses
+  int bearing_observations = 3;          // vmp: sightings from which a virtual point guides tracking
   int max_bearing = 4000;                // candidates alive at once
 };
 

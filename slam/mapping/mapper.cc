@@ -341,10 +341,10 @@ void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
 // ------------------------------------------------------------------------------------------------------
 // local BA
 
-bool Mapper::holds_pose(const Landmark& landmark) const {
-  // A virtual point's inverse depth is known within its sigma, and that is how BA (free, at least 0) and
-  // tracking (the residual's covariance) take it: it says something about rotation. (ours; the paper uses
-  // virtual points once they are points.) Two sightings agree with any mismatch along the line.
+bool Mapper::guides_tracking(const Landmark& landmark) const {
+  // A virtual point's inverse depth is known within its sigma, and that is how tracking takes it (the
+  // residual's covariance): it says something about rotation. (ours; the paper uses virtual points once they
+  // are points.) Two sightings agree with any mismatch along the line.
   if (landmark.state != LandmarkState::kBearing) return true;
   return landmark.failures == 0 &&
          static_cast<int>(landmark.observations.size()) >= config_.landmarks.bearing_observations;
@@ -374,7 +374,9 @@ void Mapper::build_problem() {
   for (const KeyframeHandle& h : window_)
     for (const LandmarkHandle& lh : map_.keyframes()[h].landmarks) {
       const Landmark* l = map_.landmarks().get(lh);
-      if (l == nullptr || !holds_pose(*l) || taken[lh.index] != 0) continue;
+      // Virtual points stay outside, as in the paper: here all that moves together by itself would be taken
+      // for one motion of the vehicle. On rendered motorways under drifting clouds they doubled the error.
+      if (l == nullptr || l->state == LandmarkState::kBearing || taken[lh.index] != 0) continue;
       if (problem_landmarks_.size() >= static_cast<std::size_t>(config_.mapping.window_landmarks)) break;
       taken[lh.index] = 1;
       problem_landmarks_.push_back(lh);
@@ -583,7 +585,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
     view->keyframes.push_back({k.id, k.T_world_body});
     for (const LandmarkHandle& lh : k.landmarks) {
       const Landmark* l = map_.landmarks().get(lh);
-      if (l == nullptr || !holds_pose(*l) || taken[lh.index] != 0) continue;
+      if (l == nullptr || !guides_tracking(*l) || taken[lh.index] != 0) continue;
       // Nearest keyframes first: what does not fit is what is seen least.
       if (view->landmarks.size() == static_cast<std::size_t>(config_.capacity.view_landmarks)) break;
       taken[lh.index] = 1;

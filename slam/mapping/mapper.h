@@ -55,8 +55,8 @@ class Mapper {
   void fuse_neighbourhood(KeyframeHandle keyframe);
   void search_neighbours_landmarks(KeyframeHandle keyframe);
   void fuse(LandmarkHandle into, LandmarkHandle from);
-  // Whether its sightings take part in poses: in BA and in the view that tracking gets.
-  [[nodiscard]] bool holds_pose(const Landmark& landmark) const;
+  // Whether it is in the view that tracking gets. Local BA takes points only.
+  [[nodiscard]] bool guides_tracking(const Landmark& landmark) const;
   void search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks);
 
   void optimise(KeyframeHandle centre, int iterations);
