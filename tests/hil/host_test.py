@@ -40,8 +40,9 @@ def frame(identifier, counter, age_s, valid):
     return data
 
 
-def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames):
-    """Epochs every 20 ms, of the newest image that is at least 30 ms old."""
+def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames, mark=lambda number: "#"):
+    """Epochs every 20 ms, of the newest image that is at least 30 ms old; `mark` between a frame's identifier and data."""
+    number = 0
     with open(path, "w") as log:
         for epoch in range(100):
             now_us = stamps_us[0] + 30_000 + 20_000 * epoch
@@ -49,15 +50,17 @@ def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames):
             frames = {i: frame(i, epoch % 15, age_s, epoch > 10) for i in sorted(LAYOUT)}
             for identifier, data in spoil(epoch, frames).items():
                 time_s = 1e-6 * (now_us - CLOCKS_US[0] + CLOCKS_US[1])
-                log.write(f"({time_s:.6f}) vcan0 {identifier:X}#{bytes(data).hex().upper()}\n")
+                log.write(f"({time_s:.6f}) vcan0 {identifier:X}{mark(number)}{bytes(data).hex().upper()}\n")
+                number += 1
 
 
 class Bus(unittest.TestCase):
-    def complaint(self, spoil=lambda epoch, frames: frames, rate_hz=RATE_HZ, expectations=("valid",)):
+    def complaint(self, spoil=lambda epoch, frames: frames, rate_hz=RATE_HZ, expectations=("valid",),
+                  mark=lambda number: "#"):
         stamps_us = [2_000_000 + PERIOD_US * i for i in range(21)]
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "bus.log"
-            bus_log(path, stamps_us, spoil)
+            bus_log(path, stamps_us, spoil, mark)
             return can_bus.Receiver(LAYOUT).check(path, stamps_us, CLOCKS_US, rate_hz, expectations)[0]
 
     def at_50(self, change):
@@ -100,6 +103,12 @@ class Bus(unittest.TestCase):
             frames[can_bus.STATUS] = frame(can_bus.STATUS, 50 % 15, 0.05, False)
             return frames
         self.assertRegex(self.complaint(self.at_50(heading)), "a heading without a valid pose")
+
+    def test_fd(self):
+        wanted = ("valid", "fd")
+        self.assertIsNone(self.complaint(expectations=wanted, mark=lambda number: "##1"))
+        self.assertRegex(self.complaint(expectations=wanted, mark=lambda number: "#" if number == 70 else "##1"),
+                         "a classic frame at")
 
     def test_no_pose(self):
         def never(epoch, frames):

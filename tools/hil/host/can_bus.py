@@ -66,14 +66,25 @@ class Epoch:
     frames: dict
 
 
-def frames_of(path):
-    """(time, identifier, data) of what candump -L wrote."""
+def lines_of(path):
+    """(time, frame) of what candump -L wrote."""
     for line in pathlib.Path(path).read_text().splitlines():
         if line.count(" ") != 2 or "#" not in line:
             continue  # cut off where candump was stopped
         time, _, frame = line.split()
-        identifier, data = frame.split("#")
-        yield float(time.strip("()")), int(identifier, 16), bytes.fromhex(data)
+        yield float(time.strip("()")), frame
+
+
+def frames_of(path):
+    """(time, identifier, data) of what candump -L wrote; of CAN FD, ID##FLAGSDATA, as of classic frames, ID#DATA."""
+    for time, frame in lines_of(path):
+        identifier, data = frame.split("##" if "##" in frame else "#")
+        yield time, int(identifier, 16), bytes.fromhex(data[1:] if "##" in frame else data)
+
+
+def classic_frame(path):
+    """A complaint of the first frame that is not one of CAN FD; None where all are."""
+    return next((f"a classic frame at {time:.3f}" for time, frame in lines_of(path) if "##" not in frame), None)
 
 
 class Receiver:
@@ -97,8 +108,10 @@ class Receiver:
         return None, found[1:-1]
 
     def check(self, path, stamps_us, clocks_us, rate_hz, expectations):
-        """Rate, counter, CRC and age; `expectations`: 'valid' (poses came), 'steady' (no gap)."""
+        """Rate, counter, CRC and age; `expectations`: 'valid' (poses came), 'steady' (no gap), 'fd' (CAN FD's frames)."""
         complaint, epochs = self.epochs(path)
+        if "fd" in expectations:
+            complaint = complaint or classic_frame(path)
         if complaint:
             return complaint, []
         if len(epochs) < LEAST_EPOCHS:
