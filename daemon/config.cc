@@ -256,6 +256,7 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   };
   require_not_above("extractor.fast_threshold_min", "extractor.fast_threshold");
   require_not_above("tracking.min_inliers", "tracking.degraded_inliers");
+  require_not_above("keyframes.min_interval_frames", "keyframes.max_interval_frames");
   if (config.camera.rate_hz > 0.0 && config.camera.lost_after_s < 1.5 / config.camera.rate_hz) {
     const auto set_at = origins.find("camera.lost_after_s");
     fail(set_at == origins.end() ? "built-in defaults" : set_at->second,

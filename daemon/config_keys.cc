@@ -171,6 +171,8 @@ std::vector<ConfigKey> make_keys() {
       number("tracking.pixel_sigma_px", "px", 0.01, 10, FIELD(estimator.tracking.pixel_sigma_px)),
 
       number("keyframes.tracked_ratio", "", 0.05, 1, FIELD(estimator.keyframes.tracked_ratio)),
+      integer("keyframes.min_interval_frames", "frames", 1, 1000,
+              FIELD(estimator.keyframes.min_interval_frames)),
       integer("keyframes.max_interval_frames", "frames", 1, 100000,
               FIELD(estimator.keyframes.max_interval_frames)),
       number("keyframes.min_parallax_px", "px", 0.1, 1000, FIELD(estimator.keyframes.min_parallax_px)),

@@ -58,6 +58,7 @@ struct TrackingConfig {
 
 struct KeyframeConfig {
   double tracked_ratio = 0.85;   // of the reference keyframe's landmarks: fewer, new keyframe
+  int min_interval_frames = 2;   // between two keyframes, or the local window reaches back too short a way
   int max_interval_frames = 10;  // with motion
   double min_parallax_px = 15;   // median motion since the last keyframe that asks for a new one
 };

@@ -273,7 +273,8 @@ void TrackingSide::begin_map(const MappingReply& reply) {
   settled_ = false;
   lost_frames_ = 0;
   trial_.reset();
-  frames_since_keyframe_ = 0;
+  // A new map's two keyframes lie far apart: it may have its third with the next frame.
+  frames_since_keyframe_ = config_.keyframes.min_interval_frames - 1;
   tracker_.start(view.T_world_reference, second->utime);
   tracker_.set_view(reply.view);
   busy_until_frame_ = second->number + static_cast<std::uint64_t>(config_.mapping.quick_view_delay_frames);

@@ -17,7 +17,8 @@ double mean_parallax_px(const LocalView& view, const TrackOutcome& outcome) {
 
 bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const TrackOutcome& outcome,
                     const KeyframeSituation& situation) {
-  if (situation.frames_since_keyframe < 1 || !situation.mapping_free) return false;
+  if (situation.frames_since_keyframe < config.keyframes.min_interval_frames || !situation.mapping_free)
+    return false;
   // Too few to be worth building on.
   if (outcome.inliers < config.tracking.min_matches) return false;
   const bool moved = outcome.median_motion_px > config.keyframes.min_parallax_px;

@@ -21,10 +21,10 @@ class KeyframePolicyTest : public testing::Test {
     outcome.T_world_body.t.x() = 1.0;
   }
 
-  bool wanted_with(int near, int distant) {
+  bool wanted_with(int near, int distant, int frames_since_keyframe = 2) {
     outcome.inliers = outcome.reference_inliers = near + distant;
     outcome.reference_nearness = near * kNear + distant * kDistant;
-    return wants_keyframe(config, view, outcome, {2, true});
+    return wants_keyframe(config, view, outcome, {frames_since_keyframe, true});
   }
 
   EstimatorConfig config;
@@ -44,6 +44,15 @@ TEST_F(KeyframePolicyTest, MissesNearLandmarksThoughDistantOnesStay) {
 
 TEST_F(KeyframePolicyTest, DoesNotMissDistantLandmarksWhileNearOnesStay) {
   EXPECT_FALSE(wanted_with(kOfEach, 10));
+}
+
+// However fast mapping is: the local window would reach back too short a way.
+TEST_F(KeyframePolicyTest, KeepsADistanceFromTheLastKeyframe) {
+  EXPECT_FALSE(wanted_with(40, kOfEach, 1));
+  EXPECT_TRUE(wanted_with(40, kOfEach, 2));
+  config.keyframes.min_interval_frames = 3;
+  EXPECT_FALSE(wanted_with(40, kOfEach, 2));
+  EXPECT_TRUE(wanted_with(40, kOfEach, 3));
 }
 
 TEST_F(KeyframePolicyTest, StandingStillNothingIsNew) {
