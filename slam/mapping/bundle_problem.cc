@@ -129,7 +129,8 @@ void evaluate_bundle(BundleProblem* problem) {
     const BundleFrames::WorldPoint world = frames.world_point(point);
     double information = 0.0;
     for (int i = 0; i < point.measurements; ++i) {
-      auto& m = problem->measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      auto& m = problem->measurements[static_cast<std::size_t>(index)];
       WorldLinearisation lin;
       if (!linearise_world(world, frames.view(m), m, &lin)) {
         m.chi2 = std::numeric_limits<double>::infinity();
@@ -146,8 +147,9 @@ double mean_chi2(const BundleProblem& problem) {
   double sum = 0.0, weight = 0.0;
   for (const BundleProblem::Point& point : problem.points)
     for (int i = 0; i < point.measurements; ++i) {
-      const auto index = static_cast<std::size_t>(point.first_measurement + i);
-      sum += point.weight * std::min(problem.measurements[index].chi2, kLargestChi2);
+      const int index = point.first_measurement + i;
+      const double chi2 = problem.measurements[static_cast<std::size_t>(index)].chi2;
+      sum += point.weight * std::min(chi2, kLargestChi2);
       weight += point.weight;
     }
   return weight > 0.0 ? sum / weight : 0.0;

@@ -37,7 +37,8 @@ double cost_of(const BundleProblem& p) {
   for (const auto& point : p.points)
     for (int i = 0; i < point.measurements; ++i) {
       Eigen::Vector2d r;
-      const auto& m = p.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      const auto& m = p.measurements[static_cast<std::size_t>(index)];
       sum += residual(p, point, m, &r) ? huber(r.squaredNorm()) : kLostCost;
     }
   return sum;
@@ -124,7 +125,8 @@ TEST(BundleLinearise, MatchesNumericDifferences) {
     // residual() can.
     if (point.inverse_depth < 1e-3) point.inverse_depth = 0;
     for (int i = 0; i < point.measurements; ++i) {
-      auto m = scene.start.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      auto m = scene.start.measurements[static_cast<std::size_t>(index)];
       m.sigma_px = 0.3 + 0.1 * i;
       at_infinity += point.inverse_depth == 0 ? 1 : 0;
       shared += point.host == m.pose ? 1 : 0;
@@ -383,7 +385,8 @@ double distance_from_optimum(const BundleProblem& p) {
   for (const auto& point : p.points) {
     double gradient = 0, curvature = 0;
     for (int i = 0; i < point.measurements; ++i) {
-      const auto& m = p.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      const auto& m = p.measurements[static_cast<std::size_t>(index)];
       BundleLinearisation lin;
       if (!linearise(p, point, m, &lin)) continue;
       const double r = lin.residual.norm();
@@ -412,7 +415,7 @@ struct Comparison {
   SceneOptions scene;
   bool bounded;  // some inverse depths end at zero
 };
-void PrintTo(const Comparison& c, std::ostream* out) {
+void PrintTo(const Comparison& c, std::ostream* out) {  // NOLINT(readability-identifier-naming)
   *out << c.name;
 }
 
@@ -513,7 +516,8 @@ TEST(EvaluateBundle, ChiSquareIsTheSquaredResidual) {
   for (const auto& point : p.points) {
     double information = 0;
     for (int i = 0; i < point.measurements; ++i) {
-      const auto& m = p.measurements[static_cast<std::size_t>(point.first_measurement + i)];
+      const int index = point.first_measurement + i;
+      const auto& m = p.measurements[static_cast<std::size_t>(index)];
       BundleLinearisation lin;
       ASSERT_TRUE(linearise(p, point, m, &lin));
       EXPECT_NEAR(m.chi2, lin.residual.squaredNorm(), 1e-12 * (1 + m.chi2));
