@@ -432,7 +432,7 @@ void Mapper::build_problem() {
     if (point.measurements == 0) continue;
     const double own_motion_px =
         kOwnMotion_rad * map_.rig().cameras[static_cast<std::size_t>(l.host_camera)].camera.focal_px();
-    point.weight = shared_error_weight(problem_, point, !map_.is_wide(l) ? own_motion_px : kPatchSigma_px);
+    point.weight = shared_error_weight(problem_, point, map_.is_wide(l) ? kPatchSigma_px : own_motion_px);
     problem_.points.push_back(point);
     problem_landmarks_[kept++] = lh;
   }

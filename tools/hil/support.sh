@@ -95,6 +95,30 @@ stop_daemon() {
   stopped_in_s=$(since "$from")
 }
 
+# How many CAN frames the daemon that was stopped counted as not sent.
+not_sent() {
+  local count
+  count=$(grep -o '[0-9]* CAN frames were not sent' $daemon_log | cut -d' ' -f1)
+  echo "${count:-0}"
+}
+
+# carry_odometry SENDER RECEIVER ARGUMENT...: the sequence, and its odometry at 50 Hz; what came is left in can.log.
+carry_odometry() {
+  local sender=$1 receiver=$2 dump
+  shift 2
+  start_playing 100
+  start_daemon --set can.enabled=true --set can.interface="$sender" --set can.rate_hz=50 "$@"
+  wait_until 20 "the stream" says "streams GREY"
+  go
+  wait_until 20 "poses" says "-> tracking"
+  candump -L "$receiver" > /tmp/can.log &
+  dump=$!
+  wait $player || fail "the frames could not be played"
+  kill $dump
+  stop_daemon
+  cp /tmp/played /tmp/can.log "$left"
+}
+
 loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
 
 # start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
@@ -128,7 +152,8 @@ prepare_libcamera() {
 
 # --- the installed package, in a machine that systemd runs
 
-main_pid() { systemctl show -p MainPID --value farpointd; }
+property() { systemctl show -p "$1" --value farpointd; }
+main_pid() { property MainPID; }
 # is_started_anew PID: the service has another process. has_other_pid PID: and that has said that it is ready.
 is_started_anew() {
   local now
@@ -139,7 +164,7 @@ has_other_pid() { is_started_anew "$1" && systemctl -q is-active farpointd; }
 journal_says() { journalctl -u farpointd --since "@$began" -o cat --no-pager | grep -q -- "$1"; }
 # service_tracks: this process of it has tracked some frames; by what it tells systemd every second.
 service_tracks() {
-  [[ $(systemctl show -p StatusText --value farpointd) =~ \ ([0-9]+)\ frames\ tracked ]] &&
+  [[ $(property StatusText) =~ \ ([0-9]+)\ frames\ tracked ]] &&
     [ "${BASH_REMATCH[1]}" -ge 5 ]
 }
 
@@ -152,4 +177,20 @@ install_service() {
   wait_until 20 "LCM's route" sh -c 'ip route | grep -q 224.0.0.0/4'
   loopback
   udevadm settle
+}
+
+# The service, on an installed package and frames without end: it tracks.
+start_service() {
+  start_playing 100000
+  go
+  systemctl start farpointd || fail "systemctl start failed"
+  wait_until 30 "the service tracks frames" service_tracks
+}
+
+stop_service() {
+  local from
+  from=$(seconds)
+  systemctl stop farpointd || fail "systemctl stop failed"
+  stopped_in_s=$(since "$from")
+  [ "$(property Result)" = success ] || fail "the stop is a failure to systemd"
 }

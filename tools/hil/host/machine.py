@@ -17,10 +17,10 @@ SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 def guest(here, packages):
     """The folder of the guest, which is built where it is not there."""
     if shutil.which(QEMU) is None:
-        raise material.NoGuest(f"no {QEMU} here, expected it installed: tools/deps --hil")
+        raise material.NotMade(f"no {QEMU} here, expected it installed: tools/deps --hil")
     done = subprocess.run([here / "guest/build", *packages], stdout=subprocess.PIPE, text=True)
     if done.returncode != 0:
-        raise material.NoGuest("the guest could not be built; it needs root and Debian's archive once")
+        raise material.NotMade("the guest could not be built; it needs root and Debian's archive once")
     return pathlib.Path(done.stdout.strip())
 
 

@@ -18,10 +18,6 @@ class NotMade(Exception):
     pass
 
 
-class NoGuest(NotMade):
-    """This machine has no virtual machine, or cannot build its guest."""
-
-
 def run(*command, **options):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
     if done.returncode != 0:

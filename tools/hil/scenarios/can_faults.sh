@@ -45,6 +45,6 @@ receive full
 kill $player
 stop_daemon
 cp /tmp/played "$left"
-refused=$(grep -o '[0-9]* CAN frames were not sent' $daemon_log | cut -d' ' -f1)
-[ "${refused:-0}" -ge 100 ] || fail "only ${refused:-0} CAN frames were counted as not sent"
+refused=$(not_sent)
+[ "$refused" -ge 100 ] || fail "only $refused CAN frames were counted as not sent"
 figure "$refused frames counted as not sent"

@@ -5,10 +5,7 @@
 #@ broken: the package of the upgrade does not restart the service
 #@ broken_says: ^restart by the upgrade: not within
 install_service
-start_playing 100000
-go
-systemctl start farpointd || fail "systemctl start failed"
-wait_until 30 "the service tracks frames" service_tracks
+start_service
 pid=$(main_pid)
 
 dpkg-deb -R "$root/farpoint.deb" /tmp/next || fail "the package cannot be unpacked"

@@ -12,10 +12,7 @@ journal_time() {
 first_pose_is_out() { [ -n "$(journal_time "$1" "initialising -> ")" ]; }
 
 install_service
-start_playing 100000
-go
-systemctl start farpointd || fail "systemctl start failed"
-wait_until 30 "the service tracks frames" service_tracks
+start_service
 pid=$(main_pid)
 user=$(ps -o user= -p "$pid")
 [ "$user" = farpoint ] || fail "the service runs as $user, expected farpoint"
@@ -42,11 +39,7 @@ took_s=$(echo "$pose_s $first_s" | awk '{printf "%.2f", $1 - $2}')
 at_most "$took_s" 3 || fail "the first pose came $took_s s after the camera's stream, expected at most 3"
 figure "first pose $took_s s after the stream"
 
-[ "$(systemctl show -p NRestarts --value farpointd)" = 2 ] || fail "systemd counts $(systemctl show -p NRestarts --value farpointd) restarts, expected 2"
-pid=$(main_pid)
-from=$(seconds)
-systemctl stop farpointd || fail "systemctl stop failed"
-stopped_in_s=$(since "$from")
+[ "$(property NRestarts)" = 2 ] || fail "systemd counts $(property NRestarts) restarts, expected 2"
+stop_service
 at_most "$stopped_in_s" 1 || fail "stopped after $stopped_in_s s, expected at most 1"
-[ "$(systemctl show -p Result --value farpointd)" = success ] || fail "the stop is a failure to systemd"
 figure "stops in $stopped_in_s s"
