@@ -190,6 +190,8 @@ std::vector<ConfigKey> make_keys() {
       integer("mapping.window_keyframes", "keyframes", 2, 1000, FIELD(estimator.mapping.window_keyframes)),
       integer("mapping.window_landmarks", "landmarks", 50, 5000000,
               FIELD(estimator.mapping.window_landmarks)),
+      integer("mapping.window_sightings", "sightings", 200, 50000000,
+              FIELD(estimator.mapping.window_sightings)),
       integer("mapping.fixed_keyframes", "keyframes", 0, 10000, FIELD(estimator.mapping.fixed_keyframes)),
       integer("mapping.iterations", "steps", 1, 1000, FIELD(estimator.mapping.iterations)),
       integer("mapping.quick_view_delay_frames", "frames", 1, 1000,

@@ -74,7 +74,8 @@ struct LandmarkConfig {
 struct MappingConfig {
   int neighbours = 20;              // keyframes searched for new landmarks
   int window_keyframes = 20;        // optimised by local BA
-  int window_landmarks = 6000;      // at most so many in one local BA
+  int window_landmarks = 4000;      // at most so many in one local BA
+  int window_sightings = 24000;     // of these landmarks, at most so many in one local BA
   int fixed_keyframes = 40;         // historical observers held fixed
   int iterations = 8;               // LM steps, never a time limit
   int quick_view_delay_frames = 1;  // lockstep: triangulation is visible so many frames after the keyframe

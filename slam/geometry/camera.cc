@@ -105,10 +105,12 @@ double solve_rising(const Value& value, const Slope& slope, double target, doubl
     const double residual = value(x) - target;
     (residual > 0.0 ? high : low) = x;
     double next = x - residual / slope(x);
-    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+    const bool newton = next >= low && next <= high;
+    if (!newton) next = 0.5 * (low + high);
     const double step = next - x;
     x = next;
-    if (std::abs(step) <= 1e-15 * (1.0 + x)) break;
+    // Newton converges quadratically: after a step below 1e-8 the next would be below 1e-15.
+    if (std::abs(step) <= (newton ? 1e-8 : 1e-15) * (1.0 + x)) break;
   }
   return x;
 }
@@ -139,6 +141,48 @@ bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vecto
     if (step.norm() < 1e-8 * (1.0 + m->norm())) return m->norm() <= max_radius * (1.0 + 1e-12);
   }
   return false;
+}
+
+// --- a point's pixel, and its derivative where `j` is given; inlined, so that what is not asked for costs
+// nothing ---
+
+inline bool project_pinhole(const Camera::Parameters& p, double max_radius, const Eigen::Vector3d& point_c,
+                            Eigen::Vector2d* pixel, Matrix23d* j) {
+  if (!(point_c.z() > 0.0)) return false;
+  const double inverse_z = 1.0 / point_c.z();
+  const Eigen::Vector2d m = inverse_z * point_c.head<2>();
+  if (!(m.squaredNorm() <= max_radius * max_radius)) return false;
+  const Eigen::Vector2d md = radtan_distort(p.distortion, m);
+  *pixel = {p.fx_px * md.x() + p.cx_px, p.fy_px * md.y() + p.cy_px};
+  if (j == nullptr) return true;
+  Eigen::Matrix2d d = radtan_derivative(p.distortion, m);
+  d.row(0) *= p.fx_px * inverse_z;
+  d.row(1) *= p.fy_px * inverse_z;
+  j->leftCols<2>() = d;
+  j->col(2) = -(d.col(0) * m.x() + d.col(1) * m.y());
+  return true;
+}
+
+inline bool project_fisheye(const Camera::Parameters& p, double max_theta_rad, const Eigen::Vector3d& point_c,
+                            Eigen::Vector2d* pixel, Matrix23d* j) {
+  const double x = point_c.x(), y = point_c.y(), z = point_c.z();
+  const double rho = std::hypot(x, y);
+  const double theta = std::atan2(rho, z);
+  if (!(theta <= max_theta_rad) || !(rho > 0.0 || z > 0.0)) return false;
+  // On the axis theta_d / rho tends to 1 / z.
+  const double k = rho > 0.0 ? fisheye_theta_d(p.distortion, theta) / rho : 1.0 / z;
+  *pixel = {p.fx_px * k * x + p.cx_px, p.fy_px * k * y + p.cy_px};
+  if (j == nullptr) return true;
+  // The distorted point is k (x, y). Its derivative along rho is a, across it k; along z it is -slope / n^2.
+  const double n2 = point_c.squaredNorm();
+  const double slope = fisheye_slope(p.distortion, theta);
+  const double a = slope * z / n2;
+  const double ex = rho > 0.0 ? x / rho : 0.0, ey = rho > 0.0 ? y / rho : 0.0;
+  *j << k + (a - k) * ex * ex, (a - k) * ex * ey, -x * slope / n2, (a - k) * ex * ey, k + (a - k) * ey * ey,
+      -y * slope / n2;
+  j->row(0) *= p.fx_px;
+  j->row(1) *= p.fy_px;
+  return true;
 }
 
 std::string wrong(const char* name, double value, const std::string& expected) {
@@ -212,49 +256,16 @@ std::string Camera::check(const Parameters& p) {
 }
 
 bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel) const {
-  const double x = point_c.x(), y = point_c.y(), z = point_c.z();
-  if (p_.model == CameraModel::kPinholeRadtan) {
-    if (!(z > 0.0)) return false;
-    const Eigen::Vector2d m(x / z, y / z);
-    if (!(m.squaredNorm() <= max_radius_ * max_radius_)) return false;
-    const Eigen::Vector2d md = radtan_distort(p_.distortion, m);
-    *pixel = {p_.fx_px * md.x() + p_.cx_px, p_.fy_px * md.y() + p_.cy_px};
-    return true;
-  }
-  const double rho = std::hypot(x, y);
-  const double theta = std::atan2(rho, z);
-  if (!(theta <= max_theta_rad_) || !(rho > 0.0 || z > 0.0)) return false;
-  // On the axis theta_d / rho tends to 1 / z.
-  const double k = rho > 0.0 ? fisheye_theta_d(p_.distortion, theta) / rho : 1.0 / z;
-  *pixel = {p_.fx_px * k * x + p_.cx_px, p_.fy_px * k * y + p_.cy_px};
-  return true;
+  return p_.model == CameraModel::kPinholeRadtan
+             ? project_pinhole(p_, max_radius_, point_c, pixel, nullptr)
+             : project_fisheye(p_, max_theta_rad_, point_c, pixel, nullptr);
 }
 
 bool Camera::project(const Eigen::Vector3d& point_c, Eigen::Vector2d* pixel,
                      Matrix23d* d_pixel_d_point) const {
-  if (!project(point_c, pixel)) return false;
-  const double x = point_c.x(), y = point_c.y(), z = point_c.z();
-  Matrix23d& j = *d_pixel_d_point;
-  if (p_.model == CameraModel::kPinholeRadtan) {
-    const Eigen::Vector2d m(x / z, y / z);
-    Matrix23d d_m_d_point;
-    d_m_d_point << 1.0 / z, 0.0, -m.x() / z, 0.0, 1.0 / z, -m.y() / z;
-    j = radtan_derivative(p_.distortion, m) * d_m_d_point;
-  } else {
-    // m = k (x, y) with k = theta_d / rho. Its derivative along rho is a, across it k; along z it is -slope /
-    // n^2.
-    const double rho = std::hypot(x, y), n2 = point_c.squaredNorm();
-    const double theta = std::atan2(rho, z);
-    const double slope = fisheye_slope(p_.distortion, theta);
-    const double k = rho > 0.0 ? fisheye_theta_d(p_.distortion, theta) / rho : 1.0 / z;
-    const double a = slope * z / n2;
-    const double ex = rho > 0.0 ? x / rho : 0.0, ey = rho > 0.0 ? y / rho : 0.0;
-    j << k + (a - k) * ex * ex, (a - k) * ex * ey, -x * slope / n2, (a - k) * ex * ey, k + (a - k) * ey * ey,
-        -y * slope / n2;
-  }
-  j.row(0) *= p_.fx_px;
-  j.row(1) *= p_.fy_px;
-  return true;
+  return p_.model == CameraModel::kPinholeRadtan
+             ? project_pinhole(p_, max_radius_, point_c, pixel, d_pixel_d_point)
+             : project_fisheye(p_, max_theta_rad_, point_c, pixel, d_pixel_d_point);
 }
 
 bool Camera::unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c) const {
@@ -273,6 +284,18 @@ bool Camera::unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c)
   const double s = rd > 0.0 ? std::sin(theta) / rd : 0.0;
   *bearing_c = Eigen::Vector3d(s * md.x(), s * md.y(), std::cos(theta)).normalized();
   return true;
+}
+
+bool Camera::unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c,
+                       Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel) const {
+  Eigen::Vector2d back;
+  Matrix23d j;
+  if (!unproject(pixel, bearing_c) || !project(*bearing_c, &back, &j)) return false;
+  // A point's distance does not move its pixel, so j maps the bearing to 0 and the two directions across it
+  // one to one: its pseudoinverse leads back to just those two.
+  const Eigen::Matrix2d jj = j * j.transpose();
+  *d_bearing_d_pixel = j.transpose() * jj.inverse();
+  return d_bearing_d_pixel->allFinite();
 }
 
 }  // namespace farpoint::slam

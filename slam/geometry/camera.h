@@ -51,6 +51,9 @@ class Camera {
   // Pixel -> unit bearing in camera axes. False where the pixel has no ray (beyond the model's range).
   // Accurate to 1e-9 rad inside the image.
   [[nodiscard]] bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c) const;
+  // The same with the 3x2 derivative d(bearing_c)/d(pixel).
+  [[nodiscard]] bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* bearing_c,
+                               Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel) const;
 
   // True where the pixel lies in the image at least border_px away from its edge.
   [[nodiscard]] bool in_image(const Eigen::Vector2d& pixel, double border_px = 0.0) const {

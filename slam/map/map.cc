@@ -227,16 +227,8 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
 bool Map::set_bearing(Landmark* l) const {
   const Camera& camera = rig_.cameras[static_cast<std::size_t>(l->host_camera)].camera;
   Eigen::Vector3d bearing;
-  if (!camera.unproject(l->host_pixel, &bearing)) return false;
   Eigen::Matrix<double, 3, 2> derivative;
-  for (int axis = 0; axis < 2; ++axis) {
-    // Central difference over one pixel: exact to second order, and the patch spans several pixels anyway.
-    const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
-    Eigen::Vector3d a, b;
-    if (!camera.unproject(l->host_pixel + half, &a) || !camera.unproject(l->host_pixel - half, &b))
-      return false;
-    derivative.col(axis) = a - b;
-  }
+  if (!camera.unproject(l->host_pixel, &bearing, &derivative)) return false;
   l->bearing = bearing;
   l->d_bearing_d_pixel = derivative;
   return true;

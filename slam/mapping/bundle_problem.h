@@ -48,6 +48,12 @@ struct BundleProblem {
     points.clear();
     measurements.clear();
   }
+  // Empty, and with memory in place for so many.
+  void make_room(std::size_t point_count, std::size_t measurement_count) {
+    points.assign(point_count, {});
+    measurements.assign(measurement_count, {});
+    clear();
+  }
 };
 
 struct BundleOptions {

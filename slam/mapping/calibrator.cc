@@ -214,7 +214,11 @@ Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
 }
 
 Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given)
-    : config_(config), given_(given), prior_(prior_information(config)), information_(prior_) {}
+    : config_(config),
+      given_(given),
+      camera_(given),
+      prior_(prior_information(config)),
+      information_(prior_) {}
 
 CalibrationDelta Calibrator::sigma() const {
   return information_.inverse().diagonal().cwiseSqrt();
@@ -223,8 +227,7 @@ CalibrationDelta Calibrator::sigma() const {
 Calibrator::Quadratic Calibrator::window_information(
     const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
   Quadratic out;
-  const Camera now = camera();
-  WindowEquations equations(problem, now);
+  WindowEquations equations(problem, camera_);
   for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
   if (!equations.reduce(&out.H, &out.g)) return out;
   out.H = (0.5 * (out.H + out.H.transpose())).eval();
@@ -232,9 +235,8 @@ Calibrator::Quadratic Calibrator::window_information(
   return out;
 }
 
-double Calibrator::image_change_px(const CalibrationDelta& change) const {
+double Calibrator::image_change_px(const Camera& next) const {
   // Largest move of a ray's pixel over the image's edge.
-  const Camera before = camera(), after = refined_camera(given_, delta_ + change);
   const double w = given_.width_px() - 1, h = given_.height_px() - 1;
   double largest = 0.0;
   for (const Eigen::Vector2d& pixel :
@@ -242,7 +244,7 @@ double Calibrator::image_change_px(const CalibrationDelta& change) const {
         Eigen::Vector2d(0, h / 2), Eigen::Vector2d(w, h / 2)}) {
     Eigen::Vector3d ray;
     Eigen::Vector2d moved;
-    if (before.unproject(pixel, &ray) && after.project(ray, &moved))
+    if (camera_.unproject(pixel, &ray) && next.project(ray, &moved))
       largest = std::max(largest, (moved - pixel).norm());
   }
   return largest;
@@ -265,12 +267,12 @@ bool Calibrator::update(const BundleProblem& problem,
   // Kept: the share of this window that no later window will see again; what was kept before fades.
   information_ = prior_ + kRemembered * (information_ - prior_) + q.H / free;
   information_vector_ = kRemembered * information_vector_ + (q.H * delta_ - q.g) / free;
-  const CalibrationDelta change = best - delta_;
-  constexpr double kNoticeable_px = 0.02;
-  if (image_change_px(change) < kNoticeable_px) return false;
+  constexpr double kNoticeable_px = 0.05;
   const Camera next = refined_camera(given_, best);
+  if (image_change_px(next) < kNoticeable_px) return false;
   if (!Camera::check(next.parameters()).empty()) return false;
   delta_ = best;
+  camera_ = next;
   constexpr double kContradicts = 5.0, kAgrees = 3.0;
   contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
   return true;

@@ -42,7 +42,7 @@ class Calibrator {
   // that far off has not been refined, only bent towards what fits. From 5 sigma (1.5 % of the focal length),
   // and until 3; the recordings' right calibrations were never further off than 2.7.
   [[nodiscard]] bool contradicts_given() const { return contradicts_given_; }
-  [[nodiscard]] Camera camera() const { return refined_camera(given_, delta_); }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
 
  private:
   struct Quadratic {
@@ -52,11 +52,12 @@ class Calibrator {
   };
   [[nodiscard]] Quadratic window_information(const BundleProblem& problem,
                                              const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const;
-  [[nodiscard]] double image_change_px(const CalibrationDelta& change) const;
+  [[nodiscard]] double image_change_px(const Camera& next) const;
 
   CalibrationConfig config_;
   Camera given_;
   CalibrationDelta delta_ = CalibrationDelta::Zero();
+  Camera camera_;  // given_ changed by delta_
   bool contradicts_given_ = false;
   // What is kept: information matrix and vector, the prior included.
   Eigen::Matrix4d prior_, information_;

@@ -75,7 +75,11 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
       views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
       calibrator_(config.calibration, rig.cameras.front().camera),
-      consistent_run_(kTrustedRun) {
+      consistent_run_(kTrustedRun),
+      solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
+              static_cast<std::size_t>(config.mapping.window_sightings)) {
+  problem_.make_room(static_cast<std::size_t>(config.mapping.window_landmarks),
+                     static_cast<std::size_t>(config.mapping.window_sightings));
   pose_index_.assign(static_cast<std::size_t>(config.capacity.keyframes), -1);
 }
 
@@ -413,6 +417,9 @@ void Mapper::build_problem() {
   for (const LandmarkHandle& lh : problem_landmarks_) {
     const Landmark& l = map_.landmarks()[lh];
     if (pose_index_[l.host.index] < 0) continue;
+    if (problem_.measurements.size() + l.observations.size() >
+        static_cast<std::size_t>(config_.mapping.window_sightings))
+      break;
     BundleProblem::Point point;
     point.host = pose_index_[l.host.index];
     point.T_host_anchor = l.T_host_anchor;
@@ -447,7 +454,7 @@ void Mapper::optimise(KeyframeHandle centre, int iterations) {
   BundleOptions options;
   options.iterations = iterations;
   const BundleSummary summary =
-      config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solve_schur(options, &problem_);
+      config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solver_.solve(options, &problem_);
   ++counts_.local_ba;
   if (!summary.usable) return;
   take_back();

@@ -16,6 +16,7 @@
 #include "slam/mapping/bundle_problem.h"
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
+#include "slam/mapping/schur_solver.h"
 #include "slam/mapping/statistics.h"
 #include "slam/stages.h"
 
@@ -91,6 +92,7 @@ class Mapper {
 
   // Work space of local BA.
   BundleProblem problem_;
+  SchurSolver solver_;
   std::vector<KeyframeHandle> window_, fixed_;
   std::vector<LandmarkHandle> problem_landmarks_;
   std::vector<int> pose_index_;  // one a keyframe slot: index in problem_.poses, or -1

@@ -130,6 +130,30 @@ TEST_P(CameraRoundTrip, DerivativeMatchesDifferences) {
   }
 }
 
+TEST_P(CameraRoundTrip, DerivativeOfTheBearingMatchesDifferences) {
+  const Camera camera(GetParam().p);
+  Rng rng(3);
+  constexpr double kStep_px = 1e-3;
+  int checked = 0;
+  while (checked < 300) {
+    const Eigen::Vector2d pixel(uniform(rng, 1, camera.width_px() - 2),
+                                uniform(rng, 1, camera.height_px() - 2));
+    Eigen::Vector3d bearing;
+    Eigen::Matrix<double, 3, 2> d;
+    ASSERT_TRUE(camera.unproject(pixel, &bearing, &d));
+    for (Eigen::Index c = 0; c < 2; ++c) {
+      const Eigen::Vector2d step = kStep_px * Eigen::Vector2d::Unit(c);
+      Eigen::Vector3d more, less;
+      if (!camera.unproject(pixel + step, &more) || !camera.unproject(pixel - step, &less)) continue;
+      EXPECT_LT((d.col(c) - (more - less) / (2 * kStep_px)).norm() * camera.focal_px(), 1e-5)
+          << pixel.transpose() << " column " << c;
+    }
+    // It stays on the unit sphere.
+    EXPECT_LT((bearing.transpose() * d).norm() * camera.focal_px(), 1e-9);
+    ++checked;
+  }
+}
+
 TEST_P(CameraRoundTrip, IsSoundOnAndNextToTheAxis) {
   const Camera camera(GetParam().p);
   const Eigen::Vector2d centre(camera.parameters().cx_px, camera.parameters().cy_px);

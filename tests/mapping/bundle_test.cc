@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "slam/mapping/bundle_problem.h"
+#include "slam/mapping/schur_solver.h"
 #include "tests/mapping/bundle_scene.h"
 
 namespace farpoint::slam {
@@ -478,6 +479,20 @@ TEST(BundleSolverBudget, MappingsEightIterationsAreEnough) {
   const BundleSummary best = solve_schur(kToTheEnd, &end);
   EXPECT_LT(schur.final_cost, 1.01 * best.final_cost);
   EXPECT_LT(schur.final_cost, 1.01 * ceres.final_cost);
+}
+
+TEST(SchurSolver, NothingOfOneProblemIsLeftForTheNext) {
+  const BundleScene large(scene_options(5, 2, 0.05, 1)), small(near_scene(2, 3, 0.1, 1));
+  SchurSolver solver(100, 100);  // too little room: it must not matter
+  for (const BundleScene* scene : {&large, &small, &large}) {
+    BundleProblem kept = scene->start, fresh = scene->start;
+    const BundleSummary a = solver.solve({}, &kept), b = solve_schur({}, &fresh);
+    EXPECT_EQ(a.final_cost, b.final_cost);
+    for (std::size_t i = 0; i < kept.poses.size(); ++i)
+      EXPECT_EQ(kept.poses[i].T_world_body.t, fresh.poses[i].T_world_body.t) << i;
+    for (std::size_t k = 0; k < kept.points.size(); ++k)
+      EXPECT_EQ(kept.points[k].inverse_depth, fresh.points[k].inverse_depth) << k;
+  }
 }
 
 // --- what evaluate_bundle says
