@@ -30,7 +30,7 @@ struct ControlConfig {
 };
 
 enum class CameraDriverChoice { kV4l2, kLibcamera };
-enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kMjpeg };
+enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
 

@@ -92,7 +92,7 @@ std::vector<ConfigKey> make_keys() {
       enumeration("camera.driver", {"v4l2", "libcamera"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
-      enumeration("camera.format", {"auto", "grey", "nv12", "yuyv", "mjpeg"}, FIELD(camera.format)),
+      enumeration("camera.format", {"auto", "grey", "nv12", "yuyv", "rgb24", "mjpeg"}, FIELD(camera.format)),
       number("camera.rate_hz", "Hz", 0, 1000, FIELD(camera.rate_hz)),
       integer("camera.buffers", "buffers", 2, 16, FIELD(camera.buffers)),
       enumeration("camera.stamp", {"auto", "start_of_exposure", "start_of_readout", "end_of_frame"},

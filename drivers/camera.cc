@@ -12,6 +12,8 @@ const char* to_string(CameraFormat format) {
       return "NV12";
     case CameraFormat::kYuyv:
       return "YUYV";
+    case CameraFormat::kRgb24:
+      return "RGB24";
     case CameraFormat::kMjpeg:
       return "MJPEG";
   }

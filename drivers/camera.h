@@ -11,7 +11,7 @@
 
 namespace farpoint::drivers {
 
-enum class CameraFormat : std::uint8_t { kAuto, kGrey, kNv12, kYuyv, kMjpeg };
+enum class CameraFormat : std::uint8_t { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
 [[nodiscard]] const char* to_string(CameraFormat format);
 
 // Who sets the exposure. kCamera: its own automatic. kAuto: AutoExposure, within limits.

@@ -58,6 +58,8 @@ bool FrameIntake::to_grey(const RawFrame& raw, ipc::GreyImage* image) {
       return grey_rows_to_grey(raw.bytes, layout, image);
     case CameraFormat::kYuyv:
       return yuyv_to_grey(raw.bytes, layout, image);
+    case CameraFormat::kRgb24:
+      return rgb24_to_grey(raw.bytes, layout, image);
     case CameraFormat::kMjpeg:
       return decoder_.decode_jpeg(raw.bytes, options_.width_px, options_.height_px, image) ==
              ipc::ImageStatus::kOk;

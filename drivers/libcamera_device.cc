@@ -13,7 +13,7 @@ namespace {
 
 // Cheapest first. libcamera does not say what rate a format reaches, so that this alone decides.
 constexpr std::array kFormats = {CameraFormat::kGrey, CameraFormat::kNv12, CameraFormat::kYuyv,
-                                 CameraFormat::kMjpeg};
+                                 CameraFormat::kRgb24, CameraFormat::kMjpeg};
 constexpr double kMicros = 1e6;
 
 }  // namespace
@@ -70,7 +70,8 @@ int LibcameraDevice::agree_on_format(const char** what) {
     format_ = format;
     return status;
   }
-  *what = "it does not give images of the calibration's size in GREY (R8), NV12, YUYV or MJPEG";
+  *what =
+      "it does not give images of the calibration's size in GREY (R8), NV12, YUYV, RGB24 (BGR888) or MJPEG";
   return -ENOTSUP;
 }
 

@@ -30,6 +30,8 @@ lc::PixelFormat pixel_format(CameraFormat format) {
       return lc::formats::NV12;
     case CameraFormat::kYuyv:
       return lc::formats::YUYV;
+    case CameraFormat::kRgb24:
+      return lc::formats::BGR888;  // named from the highest byte of a word: red is the first in memory
     case CameraFormat::kMjpeg:
       return lc::formats::MJPEG;
     case CameraFormat::kAuto:

@@ -45,6 +45,24 @@ bool yuyv_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout
   return true;
 }
 
+bool rgb24_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout, ipc::GreyImage* image) {
+  if (!has_all_rows(bytes, layout, 3)) return false;
+  set_size(layout, image);
+  // 0.299, 0.587 and 0.114 in 256ths: in all 256, so that white stays white.
+  constexpr unsigned kRed = 77, kGreen = 150, kBlue = 29, kHalf = 128;
+  const auto width = static_cast<std::size_t>(layout.width_px),
+             stride = static_cast<std::size_t>(layout.row_stride);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(layout.height_px); ++row) {
+    const std::uint8_t* from = bytes.data() + row * stride;
+    std::uint8_t* to = image->pixels.data() + row * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      const unsigned sum = kRed * from[3 * x] + kGreen * from[3 * x + 1] + kBlue * from[3 * x + 2];
+      to[x] = static_cast<std::uint8_t>((sum + kHalf) >> 8U);
+    }
+  }
+  return true;
+}
+
 double mean_grey(const ipc::GreyImage& image) {
   constexpr int kStep = 8;
   std::int64_t sum = 0, count = 0;

@@ -20,6 +20,9 @@ struct PixelLayout {
 // Y0 U Y1 V: every other byte.
 [[nodiscard]] bool yuyv_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout,
                                 ipc::GreyImage* image);
+// Red, green, blue, a byte each: their luma (ITU-R BT.601), rounded.
+[[nodiscard]] bool rgb24_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout,
+                                 ipc::GreyImage* image);
 
 // Mean over a coarse grid: what an exposure control needs of an image.
 [[nodiscard]] double mean_grey(const ipc::GreyImage& image);

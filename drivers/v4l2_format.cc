@@ -16,9 +16,10 @@ struct KnownFormat {
   int bytes_a_pixel;  // of a row of luma; 0: compressed
 };
 // Cheapest first.
-constexpr std::array<KnownFormat, 4> kFormats = {{{CameraFormat::kGrey, V4L2_PIX_FMT_GREY, 1},
+constexpr std::array<KnownFormat, 5> kFormats = {{{CameraFormat::kGrey, V4L2_PIX_FMT_GREY, 1},
                                                   {CameraFormat::kNv12, V4L2_PIX_FMT_NV12, 1},
                                                   {CameraFormat::kYuyv, V4L2_PIX_FMT_YUYV, 2},
+                                                  {CameraFormat::kRgb24, V4L2_PIX_FMT_RGB24, 3},
                                                   {CameraFormat::kMjpeg, V4L2_PIX_FMT_MJPEG, 0}}};
 constexpr std::uint32_t kMaxEntries = 256;  // of one of the driver's lists
 constexpr double kRateTolerance = 0.98;
@@ -182,7 +183,7 @@ int agree_on_format(V4l2System* system, const V4l2Node& node, const CameraOption
     agreed->rate_hz = set_rate(system, node, options.rate_hz);
     return 0;
   }
-  *what = "it does not give images of the calibration's size in GREY, NV12, YUYV or MJPEG";
+  *what = "it does not give images of the calibration's size in GREY, NV12, YUYV, RGB24 or MJPEG";
   return -ENOTSUP;
 }
 

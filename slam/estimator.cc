@@ -83,8 +83,13 @@ struct Estimator::Impl {
   std::uint64_t replies = 0;  // that mapping has given; mapping's thread
 };
 
-Estimator::Estimator(const EstimatorConfig& config, const Rig& rig)
-    : impl_(std::make_unique<Impl>(config, rig)) {}
+Estimator::Estimator(const EstimatorConfig& config, const Rig& rig) {
+  // Eigen cuts large products into pieces by the sizes of the caches that it finds, and each cut rounds
+  // otherwise: sizes of our own, common ones, or a log would give other bytes on another processor.
+  constexpr int kL1_bytes = 32 << 10, kL2_bytes = 512 << 10, kL3_bytes = 4 << 20;
+  Eigen::setCpuCacheSizes(kL1_bytes, kL2_bytes, kL3_bytes);
+  impl_ = std::make_unique<Impl>(config, rig);
+}
 Estimator::~Estimator() = default;
 
 const FrameResult& Estimator::process(const FrameInput& input) {
@@ -222,6 +227,7 @@ std::vector<std::pair<std::string, std::size_t>> Estimator::memory_table() const
   table.emplace_back("local views", impl_->mapping.mapper().view_bytes());
   table.emplace_back("exchange of jobs", impl_->exchange.bytes());
   table.emplace_back("tracker of mapping", impl_->mapping.tracker_bytes());
+  table.emplace_back("bundle adjustment", impl_->mapping.mapper().adjustment_bytes());
   table.emplace_back("keyframes", map.keyframe_bytes());
   table.emplace_back("landmarks", map.landmark_bytes());
   return table;

@@ -54,6 +54,9 @@ struct BundleProblem {
     measurements.assign(measurement_count, {});
     clear();
   }
+  [[nodiscard]] std::size_t bytes() const {
+    return points.capacity() * sizeof(Point) + measurements.capacity() * sizeof(Measurement);
+  }
 };
 
 struct BundleOptions {

@@ -44,6 +44,7 @@ class Mapper {
   // The map is kept, but not built on any more: its keyframes give back their pixels.
   void retire_map(std::int32_t map_id);
   [[nodiscard]] std::size_t view_bytes() const;
+  [[nodiscard]] std::size_t adjustment_bytes() const { return problem_.bytes() + solver_.bytes(); }
 
  private:
   KeyframeHandle make_keyframe(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);

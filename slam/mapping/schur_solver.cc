@@ -34,6 +34,13 @@ SchurSolver::SchurSolver(std::size_t points, std::size_t measurements) {
     make_room(points, 0.0, list);
 }
 
+std::size_t SchurSolver::bytes() const {
+  const std::size_t doubles = point_step_.capacity() + point_cost_.capacity() + saved_point_cost_.capacity() +
+                              saved_depths_.capacity();
+  return bearing_body_.capacity() * sizeof(Eigen::Vector3d) + blocks_.capacity() * sizeof(PointBlock) +
+         couplings_.capacity() * sizeof(Coupling) + doubles * sizeof(double);
+}
+
 BundleSummary SchurSolver::solve(const BundleOptions& options, BundleProblem* problem) {
   prepare(problem);
   const BundleSummary summary = run(options);

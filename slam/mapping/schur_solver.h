@@ -21,6 +21,9 @@ class SchurSolver {
 
   BundleSummary solve(const BundleOptions& options, BundleProblem* problem);
 
+  // Of the lists that grow with points and measurements.
+  [[nodiscard]] std::size_t bytes() const;
+
  private:
   // A landmark's part of the normal equations.
   struct PointBlock {

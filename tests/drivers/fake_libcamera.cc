@@ -123,7 +123,7 @@ int FakeLibcamera::System::configure(CameraFormat format, int width_px, int heig
   if (std::find(formats.begin(), formats.end(), format) == formats.end()) return -ENOTSUP;
   if (width_px != camera_->width_px || height_px != camera_->height_px) return -ENOTSUP;
   camera_->configured = format;
-  const int bytes_a_pixel = format == CameraFormat::kYuyv ? 2 : 1;
+  const int bytes_a_pixel = format == CameraFormat::kRgb24 ? 3 : format == CameraFormat::kYuyv ? 2 : 1;
   *stream = camera_->has;
   stream->row_stride = width_px * bytes_a_pixel + camera_->stride_padding;
   stream->requests = camera_->requests;

@@ -23,14 +23,24 @@ struct Code {
 };
 constexpr std::array kCodes = {
     Code{CameraFormat::kGrey, V4L2_PIX_FMT_GREY}, Code{CameraFormat::kNv12, V4L2_PIX_FMT_NV12},
-    Code{CameraFormat::kYuyv, V4L2_PIX_FMT_YUYV}, Code{CameraFormat::kMjpeg, V4L2_PIX_FMT_MJPEG}};
+    Code{CameraFormat::kYuyv, V4L2_PIX_FMT_YUYV}, Code{CameraFormat::kRgb24, V4L2_PIX_FMT_RGB24},
+    Code{CameraFormat::kMjpeg, V4L2_PIX_FMT_MJPEG}};
 
 std::uint32_t code_of(CameraFormat format) {
   return std::find_if(kCodes.begin(), kCodes.end(), [=](const Code& c) { return c.format == format; })->code;
 }
 
 std::uint32_t bytes_a_pixel(CameraFormat format) {
-  return format == CameraFormat::kYuyv ? 2 : format == CameraFormat::kMjpeg ? 0 : 1;
+  switch (format) {
+    case CameraFormat::kYuyv:
+      return 2;
+    case CameraFormat::kRgb24:
+      return 3;
+    case CameraFormat::kMjpeg:
+      return 0;
+    default:
+      return 1;
+  }
 }
 
 }  // namespace

@@ -29,9 +29,10 @@ constexpr std::int64_t kPeriod_us = 33'000;
 // ---- negotiation
 
 TEST_P(LiveCameraTest, TheCheapestFormatIsTaken) {
-  fake_->formats = {CameraFormat::kMjpeg, CameraFormat::kYuyv, CameraFormat::kNv12, CameraFormat::kGrey};
-  for (const CameraFormat cheapest :
-       {CameraFormat::kGrey, CameraFormat::kNv12, CameraFormat::kYuyv, CameraFormat::kMjpeg}) {
+  fake_->formats = {CameraFormat::kMjpeg, CameraFormat::kRgb24, CameraFormat::kYuyv, CameraFormat::kNv12,
+                    CameraFormat::kGrey};
+  for (const CameraFormat cheapest : {CameraFormat::kGrey, CameraFormat::kNv12, CameraFormat::kYuyv,
+                                      CameraFormat::kRgb24, CameraFormat::kMjpeg}) {
     start();
     EXPECT_EQ(fake_->configured, cheapest);
     ASSERT_EQ(kinds(), std::vector{Kind::kStreaming});
@@ -70,7 +71,8 @@ TEST_P(LiveCameraTest, ImagesComeOnceInOrderWithTheirContent) {
     ASSERT_TRUE(next());
     EXPECT_EQ(frame_.sequence, i);
     EXPECT_EQ(image_.width_px, 64);
-    EXPECT_TRUE(std::all_of(image_.pixels.begin(), image_.pixels.end(), [i](std::uint8_t p) { return p == i; }));
+    EXPECT_TRUE(
+        std::all_of(image_.pixels.begin(), image_.pixels.end(), [i](std::uint8_t p) { return p == i; }));
     EXPECT_EQ(fake_->buffers_queued(), options_.buffers);  // given back at once
   }
   EXPECT_EQ(camera_->counts().frames, 20);
@@ -105,6 +107,28 @@ TEST_P(LiveCameraTest, PaddedRowsOfEachFormat) {
     ASSERT_TRUE(next());
     for (std::size_t y = 0; y < 48; ++y)
       for (std::size_t x = 0; x < 64; ++x) ASSERT_EQ(image_.pixels[y * 64 + x], x + y);
+  }
+}
+
+TEST_P(LiveCameraTest, ColoursBecomeTheirLuma) {
+  fake_->formats = {CameraFormat::kRgb24};
+  fake_->stride_padding = 32;
+  start();
+  struct Case {
+    std::array<std::uint8_t, 3> rgb;
+    int grey;  // 0.299 R + 0.587 G + 0.114 B
+  };
+  std::uint32_t sequence = 0;
+  for (const Case& c : {Case{{255, 255, 255}, 255}, Case{{0, 0, 0}, 0}, Case{{255, 0, 0}, 76},
+                        Case{{0, 255, 0}, 150}, Case{{0, 0, 255}, 29}, Case{{10, 200, 90}, 131}}) {
+    constexpr std::size_t kStride = 3 * 64 + 32;
+    std::vector<std::uint8_t> bytes(kStride * 48, std::uint8_t{255});
+    for (std::size_t y = 0; y < 48; ++y)
+      for (std::size_t x = 0; x < 64; ++x) std::copy_n(c.rgb.data(), 3, bytes.data() + y * kStride + 3 * x);
+    fake_->pass(1000);
+    ASSERT_TRUE(fake_->show({.sequence = sequence++, .bytes = bytes}));
+    ASSERT_TRUE(next());
+    for (const std::uint8_t p : image_.pixels) ASSERT_NEAR(p, c.grey, 1);
   }
 }
 

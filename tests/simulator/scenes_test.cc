@@ -236,16 +236,19 @@ TEST(Modes, VirtualPointsReachFurther) {
   }
 }
 
-TEST(Modes, SameSeedSameBytes) {
+TEST(Modes, SameSeedSameBytesWhateverTheProcessorsCaches) {
   const Scene scene = shortened("turning", 80);
   const EstimatorConfig config = scene.estimator(LandmarkMode::kVmp);
   std::vector<slam::SE3> live[2];
   RunReport r[2];
-  for (int i = 0; i < 2; ++i)
+  for (int i = 0; i < 2; ++i) {
+    // What Eigen would find on a processor with tiny caches, and cut its products by.
+    if (i == 1) Eigen::setCpuCacheSizes(2 << 10, 4 << 10, 8 << 10);
     r[i] =
         run_scene(scene, 9, config, [&](std::uint32_t, const slam::FrameResult& f, const slam::Estimator&) {
           if (f.has_pose) live[i].push_back(f.T_map_body);
         });
+  }
   ASSERT_GT(live[0].size(), 30U);
   ASSERT_EQ(live[0].size(), live[1].size());
   const auto same = [](const slam::SE3& a, const slam::SE3& b) {

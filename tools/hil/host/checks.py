@@ -58,6 +58,29 @@ def images(folder, stock, log, of, tolerance_us="0", may_miss="0"):
                   f"time off by at most {1e-3 * worst_us:.1f} ms"]
 
 
+# The luma of the eight colour bars at 75 %: white, yellow, cyan, green, magenta, red, blue, black.
+BARS = tuple(0.75 * 255 * luma for luma in (1.0, 0.886, 0.701, 0.587, 0.413, 0.299, 0.114, 0.0))
+
+
+def bars(folder, stock, log, size, least):
+    """At least so many images of just this size, one after the other in time, each with the eight colour bars."""
+    del stock
+    before_us, number = None, 0
+    for number, (_, image) in enumerate(lcm_log.images(folder / log)):
+        if f"{image.width}x{image.height}" != size:
+            return f"image {number} has {image.width}x{image.height} pixels, expected {size}", []
+        if before_us is not None and image.utime <= before_us:
+            return f"image {number} is not later than the one before", []
+        before_us = image.utime
+        for bar, expected in enumerate(BARS):
+            grey = image.pixels[image.height // 2 * image.width + (2 * bar + 1) * image.width // 16]
+            if abs(grey - expected) > 12:
+                return f"image {number}: bar {bar + 1} is {grey}, expected {expected:.0f}", []
+    if number + 1 < int(least):
+        return f"{number + 1} images, expected {least}", []
+    return None, [f"{number + 1} images of {size}, in order, with the bars of the sensor's pattern"]
+
+
 def status(folder, stock, log, *limits):
     """The last status of a run: NAME=LEAST..MOST each."""
     del stock
@@ -177,7 +200,7 @@ def wheels(folder, stock, log, bus_log, count):
                   f"time off by at most {1e3 * worst_s:.1f} ms"]
 
 
-CHECKS = {"images": images, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
+CHECKS = {"images": images, "bars": bars, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
           "wheels": wheels}
 
 
