@@ -38,6 +38,9 @@ void print_calibration(const slam::CalibrationInfo& c) {
       "k1 {:+.5f} +- {:.5f}, against the given one",
       100.0 * std::expm1(c.focal_scale), 100.0 * c.focal_scale_sigma, c.cx_px, c.cx_sigma_px, c.cy_px,
       c.cy_sigma_px, c.k1, c.k1_sigma);
+  if (c.contradicted)
+    spdlog::warn("the images contradict the calibration: they want about {:.2f} times the given focal length",
+                 std::exp(c.focal_scale_of_images));
 }
 
 }  // namespace

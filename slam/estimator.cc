@@ -216,9 +216,15 @@ std::vector<SE3> Estimator::keyframe_poses() const {
 }
 
 CalibrationInfo Estimator::calibration() const {
-  const CalibrationDelta d = impl_->mapping.mapper().calibrator().delta(),
-                         s = impl_->mapping.mapper().calibrator().sigma();
-  return {d[0], d[1], d[2], d[3], s[0], s[1], s[2], s[3]};
+  const Calibrator& calibrator = impl_->mapping.mapper().calibrator();
+  const CalibrationDelta d = calibrator.delta(), sigma = calibrator.sigma();
+  CalibrationInfo info;
+  info.focal_scale = d[0], info.cx_px = d[1], info.cy_px = d[2], info.k1 = d[3];
+  info.focal_scale_sigma = sigma[0], info.cx_sigma_px = sigma[1], info.cy_sigma_px = sigma[2];
+  info.k1_sigma = sigma[3];
+  info.contradicted = calibrator.contradicts_given();
+  info.focal_scale_of_images = calibrator.wanted_by_images()[0];
+  return info;
 }
 
 std::vector<std::pair<std::string, std::size_t>> Estimator::memory_table() const {

@@ -138,6 +138,8 @@ struct LandmarkSighting {
 struct CalibrationInfo {
   double focal_scale = 0, cx_px = 0, cy_px = 0, k1 = 0;  // focal_scale: log of the factor
   double focal_scale_sigma = 0, cx_sigma_px = 0, cy_sigma_px = 0, k1_sigma = 0;  // 1 sigma
+  bool contradicted = false;
+  double focal_scale_of_images = 0;  // without the given one's say
 };
 
 // A view that mapping has made.

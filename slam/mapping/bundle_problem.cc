@@ -143,16 +143,4 @@ void evaluate_bundle(BundleProblem* problem) {
   }
 }
 
-double mean_chi2(const BundleProblem& problem) {
-  double sum = 0.0, weight = 0.0;
-  for (const BundleProblem::Point& point : problem.points)
-    for (int i = 0; i < point.measurements; ++i) {
-      const int index = point.first_measurement + i;
-      const double chi2 = problem.measurements[static_cast<std::size_t>(index)].chi2;
-      sum += point.weight * std::min(chi2, kLargestChi2);
-      weight += point.weight;
-    }
-  return weight > 0.0 ? sum / weight : 0.0;
-}
-
 }  // namespace farpoint::slam

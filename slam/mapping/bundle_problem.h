@@ -157,9 +157,4 @@ BundleSummary solve_ceres(const BundleOptions& options, BundleProblem* problem);
 // Fills chi2 of every measurement and sigma of every inverse depth at the present state.
 void evaluate_bundle(BundleProblem* problem);
 
-// Mean of the measurements' chi2 (two degrees of freedom; each cut off at kLargestChi2), each with the say
-// that its point's weight gives it in the adjustment. 0 without measurements.
-inline constexpr double kLargestChi2 = 20.0;
-[[nodiscard]] double mean_chi2(const BundleProblem& problem);
-
 }  // namespace farpoint::slam

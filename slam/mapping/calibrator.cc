@@ -224,6 +224,18 @@ CalibrationDelta Calibrator::sigma() const {
   return information_.inverse().diagonal().cwiseSqrt();
 }
 
+double Calibrator::surprise() const {
+  const Eigen::Matrix4d of_images = information_ - prior_;
+  const Eigen::Matrix4d covariance = of_images + of_images * prior_.inverse() * of_images;
+  return std::sqrt(std::max(0.0, information_vector_.dot(covariance.ldlt().solve(information_vector_))));
+}
+
+CalibrationDelta Calibrator::wanted_by_images() const {
+  const Eigen::Matrix4d of_images = information_ - prior_;
+  const CalibrationDelta wanted = of_images.ldlt().solve(information_vector_);
+  return wanted.allFinite() ? wanted : CalibrationDelta::Zero();
+}
+
 Calibrator::Quadratic Calibrator::window_information(
     const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
   Quadratic out;
@@ -267,14 +279,14 @@ bool Calibrator::update(const BundleProblem& problem,
   // Kept: the share of this window that no later window will see again; what was kept before fades.
   information_ = prior_ + kRemembered * (information_ - prior_) + q.H / free;
   information_vector_ = kRemembered * information_vector_ + (q.H * delta_ - q.g) / free;
+  constexpr double kContradicts = 5.0, kAgrees = 3.0;
+  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
   constexpr double kNoticeable_px = 0.05;
   const Camera next = refined_camera(given_, best);
   if (image_change_px(next) < kNoticeable_px) return false;
   if (!Camera::check(next.parameters()).empty()) return false;
   delta_ = best;
   camera_ = next;
-  constexpr double kContradicts = 5.0, kAgrees = 3.0;
-  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
   return true;
 }
 

@@ -75,7 +75,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
       views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
       calibrator_(config.calibration, rig.cameras.front().camera),
-      consistent_run_(kTrustedRun),
+      sound_run_(kTrustedRun),
       solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
               static_cast<std::size_t>(config.mapping.window_sightings)) {
   problem_.make_room(static_cast<std::size_t>(config.mapping.window_landmarks),
@@ -241,7 +241,7 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   map_.update_covisibility(newest_);
   optimise(newest_, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  if (config_.calibration.refine && consistent()) refine_calibration();
+  if (config_.calibration.refine && fits_well()) refine_calibration();
   const StageSpan span(listener_, Stage::kCulling);
   cull_redundant_keyframes(neighbours(newest_, static_cast<std::size_t>(config_.mapping.window_keyframes)),
                            newest_id_, &map_, &counts_);
@@ -457,6 +457,7 @@ void Mapper::optimise(KeyframeHandle centre, int iterations) {
       config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solver_.solve(options, &problem_);
   ++counts_.local_ba;
   if (!summary.usable) return;
+  soundness_ = soundness_of(problem_);
   take_back();
 }
 
@@ -517,26 +518,35 @@ void Mapper::update_settling(double scale_change) {
   constexpr double kSteady = 0.02;
   constexpr int kSteadyOptimisations = 3;
   const bool steady = std::fabs(std::log(scale_change)) < kSteady;
-  if (!consistent() || calibrator_.contradicts_given()) {
+  if (!is_sound() || calibrator_.contradicts_given()) {
     // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its
     // poses are not what they claim, however many inliers they have.
     settled_ = false;
     steady_optimisations_ = 0;
-    consistent_run_ = 0;
+    sound_run_ = 0;
     return;
   }
-  consistent_run_ = std::min(consistent_run_ + 1, kTrustedRun);
+  sound_run_ = std::min(sound_run_ + 1, kTrustedRun);
   steady_optimisations_ = steady ? steady_optimisations_ + 1 : 0;
-  if (steady_optimisations_ >= kSteadyOptimisations && consistent_run_ == kTrustedRun) settled_ = true;
+  if (steady_optimisations_ >= kSteadyOptimisations && sound_run_ == kTrustedRun) settled_ = true;
 }
 
-bool Mapper::consistent() const {
-  // The floor of an aligned measurement's sigma (tracking.pixel_sigma_px) is about twice the error seen on
-  // rigid scenes with a global shutter, so that a sound map shows 0.4 to 0.9; one that rolling shutter has
-  // bent shows 1.1 to 2.1. Clouds and far trees that move by themselves are many, but have little say. What
-  // held before may waver.
-  constexpr double kSound = 1.0, kStillSound = 1.1;
-  return mean_chi2(problem_) <= (settled_ ? kStillSound : kSound);
+bool Mapper::is_sound() const {
+  // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
+  // calibration the mean is 0.4 to 1.2 and the coherence 1 to 2.2, a rolling shutter under fast rotation
+  // shows 1.5 to 2.9 and 2 to 9. Neither alone is enough: the map that a rolling shutter has bent for long
+  // fits well and coherently wrong. What held before may waver.
+  constexpr double kSoundChi2 = 1.3, kStillSoundChi2 = 1.5;
+  constexpr double kSoundCoherence = 2.5, kStillSoundCoherence = 3.5;
+  return soundness_.mean_chi2 <= (settled_ ? kStillSoundChi2 : kSoundChi2) &&
+         soundness_.coherence <= (settled_ ? kStillSoundCoherence : kSoundCoherence);
+}
+
+bool Mapper::fits_well() const {
+  // How coherent the residuals are does not matter here: those of a wrong calibration are, and refinement is
+  // what finds it out.
+  constexpr double kGood = 1.0, kStillGood = 1.1;
+  return soundness_.mean_chi2 <= (settled_ ? kStillGood : kGood);
 }
 
 void Mapper::retire_map(std::int32_t map_id) {

@@ -17,6 +17,7 @@
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/schur_solver.h"
+#include "slam/mapping/soundness.h"
 #include "slam/mapping/statistics.h"
 #include "slam/stages.h"
 
@@ -67,7 +68,8 @@ class Mapper {
   void take_back();
   void refine_calibration();
   void update_settling(double scale_change);
-  [[nodiscard]] bool consistent() const;
+  [[nodiscard]] bool is_sound() const;
+  [[nodiscard]] bool fits_well() const;
 
   // From the pool; null where all views are in somebody's hands.
   std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);
@@ -89,7 +91,8 @@ class Mapper {
   // Settling: how much the last optimisations still changed the young map's unit.
   int steady_optimisations_ = 0;
   bool settled_ = false;
-  int consistent_run_;  // sound optimisations since the last that was not
+  int sound_run_;        // sound optimisations since the last that was not
+  Soundness soundness_;  // after the last one
 
   // Work space of local BA.
   BundleProblem problem_;

@@ -102,7 +102,8 @@ BundleSummary SchurSolver::run(const BundleOptions& options) {
 }
 
 const BundleProblem::Measurement& SchurSolver::measurement(const BundleProblem::Point& point, int i) const {
-  return p_->measurements[static_cast<std::size_t>(point.first_measurement + i)];
+  const int index = point.first_measurement + i;
+  return p_->measurements[static_cast<std::size_t>(index)];
 }
 
 double SchurSolver::total_cost() {

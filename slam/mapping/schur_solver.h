@@ -40,9 +40,9 @@ class SchurSolver {
   [[nodiscard]] BundleSummary run(const BundleOptions& options);
   [[nodiscard]] const BundleProblem::Measurement& measurement(const BundleProblem::Point& point, int i) const;
   [[nodiscard]] double total_cost();
-  [[nodiscard]] double cost_of(std::size_t point) const;
+  [[nodiscard]] double cost_of(std::size_t k) const;  // of the k-th landmark, as below
   void linearise_all();
-  void linearise_point(std::size_t point, PointBlock* block);
+  void linearise_point(std::size_t k, PointBlock* block);
   void add_coupling(int pose, const Vector6d& w, PointBlock* block);
   [[nodiscard]] bool solve_step(double lambda);
   void eliminate(const PointBlock& block, double inverse_hessian);
@@ -51,7 +51,7 @@ class SchurSolver {
   void restore();
   void move_poses();
   [[nodiscard]] double move_points();
-  double move_point(std::size_t point);
+  double move_point(std::size_t k);
 
   BundleProblem* p_ = nullptr;
   BundleFrames frames_;

@@ -543,28 +543,5 @@ TEST(EvaluateBundle, ChiSquareIsTheSquaredResidual) {
   }
 }
 
-// One near point whose residuals are small, and many far ones that move by themselves.
-TEST(MeanChiSquare, HasTheWeightsOfTheAdjustment) {
-  BundleProblem p;
-  EXPECT_EQ(mean_chi2(p), 0.0);
-  const auto add = [&p](double weight, int measurements, double chi2) {
-    BundleProblem::Point point;
-    point.first_measurement = static_cast<int>(p.measurements.size());
-    point.measurements = measurements;
-    point.weight = weight;
-    p.points.push_back(point);
-    BundleProblem::Measurement m;
-    m.chi2 = chi2;
-    p.measurements.insert(p.measurements.end(), static_cast<std::size_t>(measurements), m);
-  };
-  add(1.0, 10, 0.5);
-  EXPECT_DOUBLE_EQ(mean_chi2(p), 0.5);
-  add(0.1, 100, 2.0);
-  EXPECT_NEAR(mean_chi2(p), (10 * 0.5 + 0.1 * 100 * 2.0) / 20.0, 1e-12);
-  // A measurement that does not project counts as the largest that is taken.
-  add(1.0, 20, std::numeric_limits<double>::infinity());
-  EXPECT_NEAR(mean_chi2(p), (10 * 0.5 + 0.1 * 100 * 2.0 + 20 * kLargestChi2) / 40.0, 1e-12);
-}
-
 }  // namespace
 }  // namespace farpoint::slam

@@ -74,18 +74,24 @@ TEST(Calibrator, LeavesARightCameraAlone) {
   for (int i = 0; i < 4; ++i) scene.turn();
   const CalibrationDelta sigma = scene.calibrator().sigma();
   for (int i = 0; i < 4; ++i) EXPECT_LT(std::abs(scene.calibrator().delta()[i]), 4.0 * sigma[i]) << i;
+  EXPECT_LT(scene.calibrator().surprise(), 3.0);
 }
 
 TEST(Calibrator, ALargeErrorContradictsTheGivenCamera) {
   CalibratedScene scene(CalibrationDelta(0.1, 0.0, 0.0, 0.0), 3);
   for (int i = 0; i < 8; ++i) scene.turn();
   EXPECT_TRUE(scene.calibrator().contradicts_given()) << scene.calibrator().surprise();
+  // What the first windows said, before the map had followed, is remembered too.
+  EXPECT_GT(scene.calibrator().wanted_by_images()[0], 0.05);
+  EXPECT_LT(scene.calibrator().wanted_by_images()[0], 0.15);
 }
 
 TEST(Calibrator, AYoungWindowSaysNothing) {
   CalibratedScene scene(CalibrationDelta(0.004, 1.5, -1.0, 0.01), 5);
   Calibrator young({.min_keyframes = 100}, Camera(scene.calibrator().camera().parameters()));
   EXPECT_EQ(young.delta(), CalibrationDelta::Zero());
+  EXPECT_EQ(young.surprise(), 0.0);
+  EXPECT_EQ(young.wanted_by_images(), CalibrationDelta::Zero());
   EXPECT_TRUE(young.sigma().isApprox(CalibrationDelta(0.003, 2.0, 2.0, 0.02)));
 }
 

@@ -1,6 +1,7 @@
 // Whole recordings through the programs: import, lockstep replay, evaluation. The bounds are the peer's
 // figures on the same recordings (ORB-SLAM3, monocular, final trajectory, sim3), not what this version
 // happens to reach.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -63,7 +64,9 @@ TEST(RecordedDeterminism, WhatFreshMemoryHoldsDoesNotMatter) {
 
 // Straight ahead a camera cannot tell its focal length; in the first turn the images do, and from there on no
 // pose may be called valid.
-TEST(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
+class RecordedCalibration : public testing::TestWithParam<double> {};
+
+TEST_P(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
   const fs::path data = kData / "kitti", original = data / "sequences" / "03";
   if (!fs::exists(original)) GTEST_SKIP() << "no recording " << original;
   const Scratch work;
@@ -73,8 +76,8 @@ TEST(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
   fs::create_directory_symlink(original / "image_0", copy / "image_0");
   fs::create_symlink(original / "times.txt", copy / "times.txt");
   // A line of calib.txt is a 3x4 projection: its name, then f 0 cx 0 0 f cy 0 0 0 1 0.
-  ASSERT_EQ(run("awk '{ $2 *= 1.25; $7 *= 1.25; print }' " + (original / "calib.txt").string() + " > " +
-                (copy / "calib.txt").string()),
+  ASSERT_EQ(run(fmt::format("awk '{{ $2 *= {0}; $7 *= {0}; print }}' ", GetParam()) +
+                (original / "calib.txt").string() + " > " + (copy / "calib.txt").string()),
             0);
   const std::string log = work.path("recording.lcm"), out = work.path("out.lcm"),
                     said = work.path("said.txt");
@@ -87,6 +90,9 @@ TEST(RecordedCalibration, OneOfAnotherCameraIsFoundOut) {
                 " --expect 'out.live.share <= 0.4'"),
             0);
 }
+
+INSTANTIATE_TEST_SUITE_P(Factors, RecordedCalibration, testing::Values(0.5, 0.9, 1.25),
+                         [](const auto& info) { return fmt::format("{:.0f}Percent", 100.0 * info.param); });
 
 INSTANTIATE_TEST_SUITE_P(
     Recordings, RecordedAccuracy,

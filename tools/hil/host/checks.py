@@ -63,7 +63,8 @@ BARS = tuple(0.75 * 255 * luma for luma in (1.0, 0.886, 0.701, 0.587, 0.413, 0.2
 
 
 def bars(folder, stock, log, size, least):
-    """At least so many images of just this size, one after the other in time, each with the eight colour bars."""
+    """At least so many images of just this size, one after the other in time, each with the eight colour bars (looked at
+    near its lower edge: the sensor writes on its middle)."""
     del stock
     before_us, number = None, 0
     for number, (_, image) in enumerate(lcm_log.images(folder / log)):
@@ -73,7 +74,7 @@ def bars(folder, stock, log, size, least):
             return f"image {number} is not later than the one before", []
         before_us = image.utime
         for bar, expected in enumerate(BARS):
-            grey = image.pixels[image.height // 2 * image.width + (2 * bar + 1) * image.width // 16]
+            grey = image.pixels[image.height * 15 // 16 * image.width + (2 * bar + 1) * image.width // 16]
             if abs(grey - expected) > 12:
                 return f"image {number}: bar {bar + 1} is {grey}, expected {expected:.0f}", []
     if number + 1 < int(least):

@@ -6,7 +6,7 @@
 #@ broken: the sensor shows another pattern
 #@ broken_says: ^image 0: bar 1 is
 # Its pipeline takes multiples of six pixels.
-sed -i 's/^width: .*/width: 318/' /tmp/camera.yaml
+sed -i 's/^width_px: .*/width_px: 318/' /tmp/camera.yaml
 modprobe vimc || fail "no vimc"
 prepare_libcamera
 if [ -n "$BROKEN" ]; then

@@ -1,0 +1,82 @@
+#include "slam/mapping/soundness.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <vector>
+
+namespace farpoint::slam {
+
+namespace {
+
+// An affine field has six parameters; fewer measurements than this hardly tell it from chance.
+constexpr int kFieldParameters = 6, kLeastMeasurements = 30;
+
+// Least squares of a keyframe's residuals by 1, x, y, where the image reaches from -1 to 1 in x.
+struct Field {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  double squares = 0;
+  int measurements = 0;
+
+  void add(const Eigen::Vector3d& place, const Eigen::Vector2d& residual, double weight) {
+    normal += weight * place * place.transpose();
+    right += weight * place * residual.transpose();
+    squares += weight * residual.squaredNorm();
+    ++measurements;
+  }
+  [[nodiscard]] double f_statistic() const {
+    const double explained = normal.ldlt().solve(right).cwiseProduct(right).sum();
+    const int rest = 2 * measurements - kFieldParameters;
+    return (explained / kFieldParameters) / std::max((squares - explained) / rest, 1e-12);
+  }
+};
+
+Eigen::Vector3d place_of(const BundleProblem& problem, const BundleProblem::Measurement& m) {
+  const Camera& camera = problem.rig->cameras[static_cast<std::size_t>(m.camera)].camera;
+  const double half_width_px = 0.5 * camera.width_px(), half_height_px = 0.5 * camera.height_px();
+  return {1.0, (m.pixel.x() - half_width_px) / half_width_px, (m.pixel.y() - half_height_px) / half_width_px};
+}
+
+double coherence_of(const BundleProblem& problem) {
+  BundleFrames frames;
+  frames.update(problem);
+  std::vector<Field> fields(problem.poses.size());
+  for (const BundleProblem::Point& point : problem.points) {
+    const BundleFrames::WorldPoint world = frames.world_point(point);
+    for (int i = 0; i < point.measurements; ++i) {
+      const int index = point.first_measurement + i;
+      const auto& m = problem.measurements[static_cast<std::size_t>(index)];
+      const auto pose = static_cast<std::size_t>(m.pose);
+      // The host's own sighting says nothing: the landmark lies on its ray.
+      if (m.pose == point.host || problem.poses[pose].fixed || m.chi2 > kChi2TwoDof) continue;
+      Eigen::Vector2d residual;
+      if (residual_world(world, frames.view(m), m, &residual))
+        fields[pose].add(place_of(problem, m), residual, point.weight);
+    }
+  }
+  double sum = 0.0;
+  int count = 0;
+  for (const Field& field : fields)
+    if (field.measurements >= kLeastMeasurements) sum += field.f_statistic(), ++count;
+  return count > 0 ? sum / count : 0.0;
+}
+
+double mean_chi2_of(const BundleProblem& problem) {
+  double sum = 0.0, weight = 0.0;
+  for (const BundleProblem::Point& point : problem.points)
+    for (int i = 0; i < point.measurements; ++i) {
+      const int index = point.first_measurement + i;
+      const double chi2 = problem.measurements[static_cast<std::size_t>(index)].chi2;
+      sum += point.weight * std::min(chi2, kLargestChi2);
+      weight += point.weight;
+    }
+  return weight > 0.0 ? sum / weight : 0.0;
+}
+
+}  // namespace
+
+Soundness soundness_of(const BundleProblem& problem) {
+  return {mean_chi2_of(problem), coherence_of(problem)};
+}
+
+}  // namespace farpoint::slam
