@@ -13,6 +13,7 @@ constexpr double kExposureUnit_us = 100.0;  // of V4L2_CID_EXPOSURE_ABSOLUTE
 }  // namespace
 
 void V4l2Exposure::start(V4l2System* system, int fd, const ExposureOptions& options) {
+  system->wait_for_controls();
   *this = {};
   system_ = system;
   fd_ = fd;
@@ -56,20 +57,33 @@ bool V4l2Exposure::take_manual_control() {
   return true;
 }
 
+std::span<const ControlValue> V4l2Exposure::controls_for(const ExposureSetting& setting) {
+  const double exposure_us = std::clamp(setting.exposure_us, range_.min_us, range_.max_us);
+  controls_[0] = {V4L2_CID_EXPOSURE_ABSOLUTE,
+                  static_cast<std::int32_t>(std::lround(exposure_us / kExposureUnit_us))};
+  controls_[1] = {V4L2_CID_GAIN, std::clamp(setting.gain, range_.gain_min, range_.gain_max)};
+  return std::span(controls_).first(has_gain_ ? 2 : 1);
+}
+
+void V4l2Exposure::note(const ControlValue& control) {
+  if (!control.taken) return;
+  if (control.id == V4L2_CID_EXPOSURE_ABSOLUTE) exposure_us_ = kExposureUnit_us * control.value;
+  if (control.id == V4L2_CID_GAIN) gain_ = control.value;
+}
+
 void V4l2Exposure::apply(const ExposureSetting& setting) {
   applied_ = setting;
-  const double exposure_us = std::clamp(setting.exposure_us, range_.min_us, range_.max_us);
-  const auto units = static_cast<std::int64_t>(std::llround(exposure_us / kExposureUnit_us));
-  if (set(V4L2_CID_EXPOSURE_ABSOLUTE, units)) exposure_us_ = kExposureUnit_us * static_cast<double>(units);
-  if (!has_gain_) return;
-  const int gain = std::clamp(setting.gain, range_.gain_min, range_.gain_max);
-  if (set(V4L2_CID_GAIN, gain)) gain_ = gain;
+  for (ControlValue control : controls_for(setting)) {
+    control.taken = set(control.id, control.value);
+    note(control);
+  }
 }
 
 void V4l2Exposure::update(double mean_grey) {
   if (!automatic_) return;
+  for (const ControlValue& control : system_->finished_controls()) note(control);
   const ExposureSetting wanted = automatic_->update(mean_grey);
-  if (!(wanted == applied_)) apply(wanted);
+  if (!(wanted == applied_) && system_->start_controls(fd_, controls_for(wanted))) applied_ = wanted;
 }
 
 bool V4l2Exposure::query(std::uint32_t id, std::int64_t* min, std::int64_t* max) {

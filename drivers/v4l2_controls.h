@@ -1,8 +1,10 @@
 // Exposure and gain of a V4L2 camera, by whichever of the controls it has.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "drivers/auto_exposure.h"
 #include "drivers/v4l2_system.h"
@@ -13,8 +15,8 @@ class V4l2Exposure {
  public:
   // Asks the camera what it can do, and sets what the options want.
   void start(V4l2System* system, int fd, const ExposureOptions& options);
-  // After each image: what the automatic wants of the next ones. One blocking call of the driver where a
-  // setting changes, none otherwise.
+  // After each image: what the automatic wants of the next ones. Does not wait for the camera, which may take
+  // some images to follow.
   void update(double mean_grey);
 
   // Of the images to come; nothing where the camera does not say.
@@ -28,6 +30,9 @@ class V4l2Exposure {
   [[nodiscard]] std::optional<std::int64_t> get(std::uint32_t id);
   void leave_to_camera();
   [[nodiscard]] bool take_manual_control();
+  // As the camera takes it: exposure, and gain where it has one.
+  [[nodiscard]] std::span<const ControlValue> controls_for(const ExposureSetting& setting);
+  void note(const ControlValue& control);
   void apply(const ExposureSetting& setting);
 
   V4l2System* system_ = nullptr;
@@ -35,6 +40,7 @@ class V4l2Exposure {
   bool has_gain_ = false;
   ExposureRange range_;
   ExposureSetting applied_;
+  std::array<ControlValue, ControlWriter::kMost> controls_;
   std::optional<AutoExposure> automatic_;
   std::optional<double> exposure_us_;
   std::optional<int> gain_;

@@ -24,7 +24,6 @@ class V4l2Device final : public CameraDevice {
   [[nodiscard]] int fd() const override { return node_.fd; }
   [[nodiscard]] int take(RawFrame* raw, const char** what) override;
   [[nodiscard]] int give_back(const char** what) override;
-  // One blocking call of the driver where a setting changes, none otherwise.
   void adapt_exposure(const ipc::GreyImage& image) override;
   void set_exposure(const ExposureOptions& options) override;
 

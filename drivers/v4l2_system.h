@@ -3,6 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+
+#include "drivers/control_writer.h"
 
 namespace farpoint::drivers {
 
@@ -17,6 +20,12 @@ class V4l2System {
   // Null where it cannot be mapped.
   [[nodiscard]] virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;
   virtual void unmap(void* memory, std::size_t bytes) = 0;
+
+  // VIDIOC_S_CTRL without waiting for the camera, as ControlWriter says it. close() waits for what is under
+  // way.
+  [[nodiscard]] virtual bool start_controls(int fd, std::span<const ControlValue> controls) = 0;
+  [[nodiscard]] virtual std::span<const ControlValue> finished_controls() = 0;
+  virtual void wait_for_controls() = 0;
 };
 
 class LinuxV4l2System final : public V4l2System {
@@ -26,6 +35,15 @@ class LinuxV4l2System final : public V4l2System {
   [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
+  [[nodiscard]] bool start_controls(int fd, std::span<const ControlValue> controls) override {
+    return writer_.start(fd, controls);
+  }
+  [[nodiscard]] std::span<const ControlValue> finished_controls() override { return writer_.finished(); }
+  void wait_for_controls() override { writer_.wait(); }
+
+ private:
+  ControlWriter writer_{[this](int fd, const ControlValue& control) { return set_control(fd, control); }};
+  bool set_control(int fd, const ControlValue& control);
 };
 
 }  // namespace farpoint::drivers

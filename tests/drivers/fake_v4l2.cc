@@ -53,6 +53,10 @@ class FakeV4l2::System final : public drivers::V4l2System {
   [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
+  // At once: threads are ControlWriter's affair.
+  [[nodiscard]] bool start_controls(int fd, std::span<const drivers::ControlValue> controls) override;
+  [[nodiscard]] std::span<const drivers::ControlValue> finished_controls() override;
+  void wait_for_controls() override { static_cast<void>(finished_controls()); }
 
  private:
   int list_format(v4l2_fmtdesc* entry);
@@ -68,6 +72,8 @@ class FakeV4l2::System final : public drivers::V4l2System {
   [[nodiscard]] std::size_t buffer_bytes() const { return camera_->set_.sizeimage; }
 
   FakeV4l2* camera_;
+  std::array<drivers::ControlValue, drivers::ControlWriter::kMost> controls_;
+  std::size_t controls_set_ = 0;  // and not yet asked for
 };
 
 // --- what tests ask for
@@ -174,6 +180,19 @@ int FakeV4l2::System::ioctl(int, unsigned long request, void* argument) {
     default:
       return control(request, argument);
   }
+}
+
+bool FakeV4l2::System::start_controls(int fd, std::span<const drivers::ControlValue> controls) {
+  if (controls_set_ > 0) return false;
+  for (const drivers::ControlValue& wanted : controls) {
+    v4l2_control argument{wanted.id, wanted.value};
+    controls_.at(controls_set_++) = {wanted.id, wanted.value, ioctl(fd, VIDIOC_S_CTRL, &argument) >= 0};
+  }
+  return true;
+}
+
+std::span<const drivers::ControlValue> FakeV4l2::System::finished_controls() {
+  return std::span(controls_).first(std::exchange(controls_set_, 0));
 }
 
 const CameraFormat* FakeV4l2::System::find(std::uint32_t code) const {

@@ -150,6 +150,30 @@ class Images(unittest.TestCase):
         self.assertRegex(self.complaint(late), "image 4 of time 7430 is of no frame")
 
 
+class Bars(unittest.TestCase):
+    def complaint(self, spoil=lambda events: events, least="5", size="318x240"):
+        row = bytes(round(checks.BARS[8 * x // 318]) for x in range(318))
+        events = []
+        for number in range(6):
+            head = lcm_log.IMAGE.pack(7_000 + 100 * number, number, 0, -1, -1.0, 318, 240, 318, 0, 240 * 318)
+            events.append(("CAMERA_0", bytes(8) + head + 240 * row))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            lcm_log.write(folder / "run.lcm", spoil(events))
+            return checks.bars(folder, types.SimpleNamespace(), "run.lcm", size, least)[0]
+
+    def test_good(self):
+        self.assertIsNone(self.complaint())
+
+    def test_other_pattern_size_order_or_number(self):
+        grey = lambda e: e[:4] + [("CAMERA_0", e[4][1][:-240 * 318] + bytes([128]) * 240 * 318)]  # noqa: E731
+        self.assertRegex(self.complaint(grey), "^image 4: bar 1 is 128, expected 191")
+        self.assertRegex(self.complaint(size="320x240"), "^image 0 has 318x240 pixels, expected 320x240")
+        self.assertRegex(self.complaint(lambda e: [e[1], e[0], *e[2:]]), "^image 1 is not later")
+        self.assertRegex(self.complaint(least="7"), "^6 images, expected 7")
+        self.assertRegex(self.complaint(lambda e: []), "^0 images, expected 5")
+
+
 class Wheels(unittest.TestCase):
     def complaint(self, spoil=lambda events: events, late_us=2_000, count="10"):
         events, bus = [], []

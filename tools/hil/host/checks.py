@@ -66,20 +66,20 @@ def bars(folder, stock, log, size, least):
     """At least so many images of just this size, one after the other in time, each with the eight colour bars (looked at
     near its lower edge: the sensor writes on its middle)."""
     del stock
-    before_us, number = None, 0
+    before_us, came = None, 0
     for number, (_, image) in enumerate(lcm_log.images(folder / log)):
         if f"{image.width}x{image.height}" != size:
             return f"image {number} has {image.width}x{image.height} pixels, expected {size}", []
         if before_us is not None and image.utime <= before_us:
             return f"image {number} is not later than the one before", []
-        before_us = image.utime
+        before_us, came = image.utime, number + 1
         for bar, expected in enumerate(BARS):
             grey = image.pixels[image.height * 15 // 16 * image.width + (2 * bar + 1) * image.width // 16]
             if abs(grey - expected) > 12:
                 return f"image {number}: bar {bar + 1} is {grey}, expected {expected:.0f}", []
-    if number + 1 < int(least):
-        return f"{number + 1} images, expected {least}", []
-    return None, [f"{number + 1} images of {size}, in order, with the bars of the sensor's pattern"]
+    if came < int(least):
+        return f"{came} images, expected {least}", []
+    return None, [f"{came} images of {size}, in order, with the bars of the sensor's pattern"]
 
 
 def status(folder, stock, log, *limits):
