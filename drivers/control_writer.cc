@@ -8,7 +8,8 @@
 namespace farpoint::drivers {
 
 ControlWriter::ControlWriter(Set set) : set_(std::move(set)) {
-  constexpr std::size_t kStack_bytes = std::size_t{64} << 10;  // locked memory means all of it
+  // Locked memory means all of it; the program's thread-local variables are in it, so that 64 kB are too few.
+  constexpr std::size_t kStack_bytes = std::size_t{256} << 10;
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   pthread_attr_setstacksize(&attributes, kStack_bytes);

@@ -50,7 +50,7 @@ inline std::vector<Eigen::Vector3d> special_rotation_vectors() {
     for (const Eigen::Vector3d& axis :
          {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, -1),
           Eigen::Vector3d(1, -2, 3).normalized(), Eigen::Vector3d(-1, 1e-9, 1e-5).normalized()}) {
-      all.push_back(angle * axis);
+      all.emplace_back(angle * axis);
     }
   }
   return all;
