@@ -209,6 +209,37 @@ class Wheels(unittest.TestCase):
         self.assertRegex(self.complaint(late_us=30_000), "time off by 30.0 ms")
 
 
+class Quiet(unittest.TestCase):
+    """Histograms as the kernel writes them."""
+
+    def complaint(self, heap="{ common_pid:          9 } hitcount:         77", function="do_sys_poll", times=300):
+        waits = (f"# event histogram\n#\n\n{{ prev_pid:         11, stacktrace:\n         __schedule+0x2d5/0x9e0\n"
+                 f"         {function}+0x1e/0x40\n}} hitcount:        {times}\n")
+        calls = "{ common_pid:         11, id:          7 } hitcount:        300\n"
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "threads").write_text("9 fp-mapping\n11 fp-capture\n")
+            (folder / "trace.malloc").write_text("# event histogram\n\n" + heap + "\n")
+            (folder / "trace.sched_switch").write_text(waits)
+            (folder / "trace.sys_enter").write_text(calls)
+            return checks.quiet(folder, types.SimpleNamespace(), "trace", "200", "fp-capture=do_sys_poll")
+
+    def test_good(self):
+        self.assertEqual(self.complaint(),
+                         (None, ["fp-capture: no heap call, 300 waits, all in do_sys_poll; its calls: poll 300"]))
+
+    def test_heap(self):
+        self.assertRegex(self.complaint(heap="{ common_pid:         11 } hitcount:          3")[0],
+                         "^fp-capture made 3 heap calls")
+
+    def test_other_wait(self):
+        self.assertRegex(self.complaint(function="futex_wait")[0],
+                         "^fp-capture slept 300 times elsewhere than in do_sys_poll: __schedule < futex_wait")
+
+    def test_seldom_or_not_there(self):
+        self.assertRegex(self.complaint(times=199)[0], "^fp-capture slept 199 times, expected 200")
+
+
 class Scenarios(unittest.TestCase):
     def test_can_be_read(self):
         known = scenario.read_all(ROOT / "tools/hil/scenarios")

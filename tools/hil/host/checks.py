@@ -1,6 +1,7 @@
 """What the host checks of what a scenario left: each check gives (complaint or None, figures)."""
 
 import pathlib
+import re
 import struct
 
 from host import can_bus, lcm_log
@@ -201,8 +202,60 @@ def wheels(folder, stock, log, bus_log, count):
                   f"time off by at most {1e3 * worst_s:.1f} ms"]
 
 
+# Of x86-64, as far as they are seen.
+SYSTEM_CALLS = {0: "read", 1: "write", 7: "poll", 16: "ioctl", 35: "nanosleep", 44: "sendto", 46: "sendmsg", 202: "futex",
+                230: "clock_nanosleep", 271: "ppoll"}
+HEAP = ("malloc", "calloc", "realloc", "memalign", "aligned_alloc", "posix_memalign")
+
+
+def histogram(path):
+    """[(keys, number)] of one of the kernel's histograms: keys by name, a stacktrace as its functions."""
+    if not path.exists():
+        return []
+    found = []
+    for keys, number in re.findall(r"^\{ (.*?)\} hitcount: +(\d+)", path.read_text(), re.MULTILINE | re.DOTALL):
+        scalars, _, stack = keys.partition("stacktrace:")
+        one = {key: int(value) for key, value in re.findall(r"(\w+): +(\d+)", scalars)}
+        one["stacktrace"] = re.findall(r"^\s+(\w[\w.]*)\+0x", stack, re.MULTILINE)
+        found.append((one, int(number)))
+    return found
+
+
+def waits_of(task, trace):
+    """[(functions of the kernel, innermost first, times)] in which a thread was not runnable."""
+    return [(keys["stacktrace"], number) for keys, number in histogram(trace("sched_switch")) if keys["prev_pid"] == task]
+
+
+def quiet(folder, stock, prefix, least, *threads):
+    """By the kernel's histograms, each thread (NAME=FUNCTION) made no heap call, and slept in FUNCTION alone, so often."""
+    del stock
+    tasks = {name: int(number) for number, name in (line.split() for line in
+                                                     (folder / "threads").read_text().splitlines())}
+    figures = []
+
+    def trace(event):
+        return folder / f"{prefix}.{event}"
+
+    for name, function in (thread.split("=") for thread in threads):
+        task = tasks.get(name, -1)
+        heap = sum(number for event in HEAP for keys, number in histogram(trace(event)) if keys["common_pid"] == task)
+        if heap > 0:
+            return f"{name} made {heap} heap calls", []
+        waits = waits_of(task, trace)
+        for functions, number in waits:
+            if function not in functions:
+                return f"{name} slept {number} times elsewhere than in {function}: {' < '.join(functions)}", []
+        number = sum(times for _, times in waits)
+        if number < int(least):
+            return f"{name} slept {number} times, expected {least}", []
+        calls = {keys["id"]: times for keys, times in histogram(trace("sys_enter")) if keys["common_pid"] == task}
+        told = ", ".join(f"{SYSTEM_CALLS.get(call, call)} {times}" for call, times in sorted(calls.items()))
+        figures.append(f"{name}: no heap call, {number} waits, all in {function}; its calls: {told}")
+    return None, figures
+
+
 CHECKS = {"images": images, "bars": bars, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
-          "wheels": wheels}
+          "wheels": wheels, "quiet": quiet}
 
 
 def run(check, folder, stock):

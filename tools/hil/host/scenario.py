@@ -4,6 +4,7 @@
     #@ form: short                    or long
     #@ machine: systemd               else in a machine without it
     #@ devices: -device ...           further devices of the machine
+    #@ seconds: what it takes, where that is more than a usual scenario does
     #@ needs: package                 the .deb is laid beside it; libcamera: the module that farpointd loads
     #@ check: NAME ARGUMENT...        of checks.py, on what it left; any number
     #@ broken: what is left out or inverted where $BROKEN is set
@@ -24,6 +25,7 @@ class Scenario:
     machine: str = "plain"
     devices: str = ""
     needs: str = ""
+    seconds: int = 0
     broken: str = ""
     broken_says: str = ""
     checks: list = dataclasses.field(default_factory=list)
@@ -41,6 +43,8 @@ def read(path):
         key, value = line[3:].split(": ", 1)
         if key == "check":
             one.checks.append(value.split())
+        elif key == "seconds":
+            one.seconds = int(value)
         elif key in ("form", "machine", "devices", "needs", "broken", "broken_says"):
             setattr(one, key, value)
         else:
