@@ -203,8 +203,9 @@ def wheels(folder, stock, log, bus_log, count):
 
 
 # Of x86-64, as far as they are seen.
-SYSTEM_CALLS = {0: "read", 1: "write", 7: "poll", 16: "ioctl", 35: "nanosleep", 44: "sendto", 46: "sendmsg", 202: "futex",
-                230: "clock_nanosleep", 271: "ppoll"}
+SYSTEM_CALLS = {0: "read", 1: "write", 3: "close", 7: "poll", 11: "munmap", 16: "ioctl", 35: "nanosleep", 44: "sendto",
+                46: "sendmsg", 47: "recvmsg", 98: "getrusage", 202: "futex", 228: "clock_gettime",
+                230: "clock_nanosleep", 257: "openat", 271: "ppoll"}
 HEAP = ("malloc", "calloc", "realloc", "memalign", "aligned_alloc", "posix_memalign")
 
 
@@ -223,11 +224,12 @@ def histogram(path):
 
 def waits_of(task, trace):
     """[(functions of the kernel, innermost first, times)] in which a thread was not runnable."""
-    return [(keys["stacktrace"], number) for keys, number in histogram(trace("sched_switch")) if keys["prev_pid"] == task]
+    sleeps = histogram(trace("sched_switch"))
+    return [(keys["stacktrace"], number) for keys, number in sleeps if keys["prev_pid"] == task]
 
 
 def quiet(folder, stock, prefix, least, *threads):
-    """By the kernel's histograms, each thread (NAME=FUNCTION) made no heap call, and slept in FUNCTION alone, so often."""
+    """By the kernel's histograms, each thread (NAME=FUNCTION) made no heap call, and slept in FUNCTION alone."""
     del stock
     tasks = {name: int(number) for number, name in (line.split() for line in
                                                      (folder / "threads").read_text().splitlines())}

@@ -1,4 +1,4 @@
-# Five minutes of tracking, with odometry and LCM going out: the kernel's tracer sees no heap call and one kind of wait a thread.
+# Five minutes of tracking, odometry and LCM going out: the kernel's tracer sees no heap call and one wait a thread.
 #@ form: long
 #@ seconds: 900
 #@ check: quiet trace 2900 fp-capture=do_sys_poll fp-tracking=futex_wait_queue fp-output=futex_wait_queue
@@ -42,8 +42,9 @@ while read -r name _; do trace "heap/$name" common_pid; done < /tmp/places
 trace raw_syscalls/sys_enter common_pid,id
 trace sched/sched_switch prev_pid,stacktrace "prev_state & 255"
 wait $player || fail "the frames could not be played"
-for histogram in heap/{malloc,calloc,realloc,memalign,aligned_alloc,posix_memalign} raw_syscalls/sys_enter sched/sched_switch; do
-  [ -e "$tracing/events/$histogram/hist" ] && cat "$tracing/events/$histogram/hist" > "$left/trace.${histogram##*/}"
+for histogram in $tracing/events/{heap/*,raw_syscalls/sys_enter,sched/sched_switch}/hist; do
+  event=${histogram%/hist}
+  cat "$histogram" > "$left/trace.${event##*/}"
 done
 /tmp/farpoint ctl status --socket $control > "$left/state" || fail "no answer of the control socket"
 stop_daemon
