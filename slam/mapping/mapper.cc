@@ -533,13 +533,14 @@ void Mapper::update_settling(double scale_change) {
 
 bool Mapper::is_sound() const {
   // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
-  // calibration the mean is 0.4 to 1.2 and the coherence 1 to 2.2, a rolling shutter under fast rotation
-  // shows 1.5 to 2.9 and 2 to 9. Neither alone is enough: the map that a rolling shutter has bent for long
-  // fits well and coherently wrong. What held before may waver.
+  // calibration the mean is 0.4 to 1.2. They may also have a pattern that is too small to matter, where the
+  // measurements are good: mean times coherence is 0.4 to 2.4 then, and up to 3.4 for a moment. A rolling
+  // shutter under fast rotation shows means of 1 to 3, and 2 to 20. Neither alone is enough: the map that it
+  // has bent for long fits well and coherently wrong. What held before may waver.
   constexpr double kSoundChi2 = 1.3, kStillSoundChi2 = 1.5;
-  constexpr double kSoundCoherence = 2.5, kStillSoundCoherence = 3.5;
+  constexpr double kSoundPattern = 2.5, kStillSoundPattern = 3.5;
   return soundness_.mean_chi2 <= (settled_ ? kStillSoundChi2 : kSoundChi2) &&
-         soundness_.coherence <= (settled_ ? kStillSoundCoherence : kSoundCoherence);
+         soundness_.pattern() <= (settled_ ? kStillSoundPattern : kSoundPattern);
 }
 
 bool Mapper::fits_well() const {

@@ -18,6 +18,8 @@ struct Soundness {
   // patches know nothing of each other, those of a camera are a field. 0 where no keyframe has enough
   // measurements to tell.
   double coherence = 0;
+  // How large the field is, in terms of chi2.
+  [[nodiscard]] double pattern() const { return mean_chi2 * coherence; }
 };
 
 inline constexpr double kLargestChi2 = 20.0;

@@ -60,6 +60,7 @@ TEST(Soundness, CoherenceDoesNotKnowHowLargeTheErrorsAre) {
 TEST(Soundness, RollingShutterIsCoherent) {
   const Soundness bent = adjusted(SceneOptions{}, rolling_shutter);
   EXPECT_GT(bent.coherence, 5.0);
+  EXPECT_GT(bent.pattern(), 3.0 * adjusted(SceneOptions{}, nowhere).pattern());
   // The residuals have hardly grown.
   EXPECT_LT(bent.mean_chi2, 1.5 * adjusted(SceneOptions{}, nowhere).mean_chi2);
 }
