@@ -39,8 +39,10 @@ void print_calibration(const slam::CalibrationInfo& c) {
       100.0 * std::expm1(c.focal_scale), 100.0 * c.focal_scale_sigma, c.cx_px, c.cx_sigma_px, c.cy_px,
       c.cy_sigma_px, c.k1, c.k1_sigma);
   if (c.contradicted)
-    spdlog::warn("the images contradict the calibration: they want about {:.2f} times the given focal length",
-                 std::exp(c.focal_scale_of_images));
+    spdlog::warn(
+        "the images contradict the calibration: alone they want about {:.2f} times the given focal length; "
+        "where that is near 1, another centre or distortion",
+        std::exp(c.focal_scale_of_images));
 }
 
 }  // namespace

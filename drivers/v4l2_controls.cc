@@ -81,9 +81,17 @@ void V4l2Exposure::apply(const ExposureSetting& setting) {
 
 void V4l2Exposure::update(double mean_grey) {
   if (!automatic_) return;
-  for (const ControlValue& control : system_->finished_controls()) note(control);
+  if (under_way_) {
+    const auto finished = system_->finished_controls();
+    // The images still show the setting before: what they say of it must not be acted upon twice.
+    if (finished.empty()) return;
+    for (const ControlValue& control : finished) note(control);
+    under_way_ = false;
+  }
   const ExposureSetting wanted = automatic_->update(mean_grey);
-  if (!(wanted == applied_) && system_->start_controls(fd_, controls_for(wanted))) applied_ = wanted;
+  if (wanted == applied_ || !system_->start_controls(fd_, controls_for(wanted))) return;
+  applied_ = wanted;
+  under_way_ = true;
 }
 
 bool V4l2Exposure::query(std::uint32_t id, std::int64_t* min, std::int64_t* max) {

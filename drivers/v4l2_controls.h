@@ -40,6 +40,7 @@ class V4l2Exposure {
   bool has_gain_ = false;
   ExposureRange range_;
   ExposureSetting applied_;
+  bool under_way_ = false;  // the camera has not taken applied_ yet
   std::array<ControlValue, ControlWriter::kMost> controls_;
   std::optional<AutoExposure> automatic_;
   std::optional<double> exposure_us_;

@@ -1,6 +1,5 @@
 #include "slam/mapping/bundle_problem.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

@@ -10,7 +10,6 @@
 // one part in `keyframes of the window` is kept, and fades as the map gets better.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "slam/config.h"

@@ -114,6 +114,7 @@ KeyframeHandle Mapper::make_keyframe(const Frame& frame, const SE3& T_world_body
 std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std::int32_t map_id) {
   settled_ = false;
   steady_optimisations_ = 0;
+  soundness_ = {};
   recent_.clear();
   const KeyframeHandle first = make_keyframe(*pair.first, SE3{}, map_id);
   const KeyframeHandle second = make_keyframe(*pair.second, pair.T_first_second, map_id);
@@ -143,7 +144,7 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
       ++counts_.landmarks_made;
   }
   map_.update_covisibility(second);
-  optimise(second, 20);
+  static_cast<void>(optimise(second, 20));
   std::size_t alive = 0;
   map_.landmarks().for_each(
       [&](LandmarkHandle, const Landmark& l) { alive += l.map_id == map_id ? 1U : 0U; });
@@ -239,9 +240,9 @@ std::shared_ptr<const LocalView> Mapper::refine() {
     fuse_neighbourhood(newest_);
   }
   map_.update_covisibility(newest_);
-  optimise(newest_, config_.mapping.iterations);
+  const bool optimised = optimise(newest_, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  if (config_.calibration.refine && fits_well()) refine_calibration();
+  if (optimised && config_.calibration.refine && fits_well()) refine_calibration();
   const StageSpan span(listener_, Stage::kCulling);
   cull_redundant_keyframes(neighbours(newest_, static_cast<std::size_t>(config_.mapping.window_keyframes)),
                            newest_id_, &map_, &counts_);
@@ -446,19 +447,20 @@ void Mapper::build_problem() {
   problem_landmarks_.resize(kept);
 }
 
-void Mapper::optimise(KeyframeHandle centre, int iterations) {
+bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   const StageSpan span(listener_, Stage::kLocalBa);
   select_window(centre);
   build_problem();
-  if (problem_.points.empty()) return;
+  if (problem_.points.empty()) return false;
   BundleOptions options;
   options.iterations = iterations;
   const BundleSummary summary =
       config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solver_.solve(options, &problem_);
   ++counts_.local_ba;
-  if (!summary.usable) return;
+  if (!summary.usable) return false;
   soundness_ = soundness_of(problem_);
   take_back();
+  return true;
 }
 
 void Mapper::refine_calibration() {
@@ -534,11 +536,11 @@ void Mapper::update_settling(double scale_change) {
 bool Mapper::is_sound() const {
   // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
   // calibration the mean is 0.4 to 1.2. They may also have a pattern that is too small to matter, where the
-  // measurements are good: mean times coherence is 0.4 to 2.4 then, and up to 3.4 for a moment. A rolling
-  // shutter under fast rotation shows means of 1 to 3, and 2 to 20. Neither alone is enough: the map that it
-  // has bent for long fits well and coherently wrong. What held before may waver.
+  // measurements are good: mean times coherence is 0.4 to 1.8 then, and up to 2.8 for a moment. A rolling
+  // shutter under fast rotation shows means of 1 to 3, and 1.5 to 15. Neither alone is enough: the map that
+  // it has bent for long fits well and coherently wrong. What held before may waver.
   constexpr double kSoundChi2 = 1.3, kStillSoundChi2 = 1.5;
-  constexpr double kSoundPattern = 2.5, kStillSoundPattern = 3.5;
+  constexpr double kSoundPattern = 2.0, kStillSoundPattern = 3.0;
   return soundness_.mean_chi2 <= (settled_ ? kStillSoundChi2 : kSoundChi2) &&
          soundness_.pattern() <= (settled_ ? kStillSoundPattern : kSoundPattern);
 }

@@ -62,7 +62,8 @@ class Mapper {
   [[nodiscard]] bool guides_tracking(const Landmark& landmark) const;
   void search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks);
 
-  void optimise(KeyframeHandle centre, int iterations);
+  // False where there was nothing to optimise, or nothing usable came of it.
+  bool optimise(KeyframeHandle centre, int iterations);
   void select_window(KeyframeHandle centre);
   void build_problem();
   void take_back();

@@ -29,7 +29,7 @@ void make_room(std::size_t count, const T& anything, std::vector<T>* list) {
 SchurSolver::SchurSolver(std::size_t points, std::size_t measurements) {
   make_room(points, Eigen::Vector3d(0.0, 0.0, 0.0), &bearing_body_);
   make_room(points, {}, &blocks_);
-  make_room(measurements, {}, &couplings_);
+  make_room(measurements + points, {}, &couplings_);  // with each measurement's keyframe, and the host
   for (auto* list : {&point_step_, &point_cost_, &saved_point_cost_, &saved_depths_})
     make_room(points, 0.0, list);
 }

@@ -9,25 +9,33 @@ namespace farpoint::slam {
 namespace {
 
 // An affine field has six parameters; fewer measurements than this hardly tell it from chance.
-constexpr int kFieldParameters = 6, kLeastMeasurements = 30;
+constexpr double kLeastMeasurements = 30.0;
 
 // Least squares of a keyframe's residuals by 1, x, y, where the image reaches from -1 to 1 in x.
 struct Field {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  // Sums of weight, weight^2.
+  double weight = 0, weight2 = 0;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero(), normal2 = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
   double squares = 0;
-  int measurements = 0;
 
-  void add(const Eigen::Vector3d& place, const Eigen::Vector2d& residual, double weight) {
-    normal += weight * place * place.transpose();
-    right += weight * place * residual.transpose();
-    squares += weight * residual.squaredNorm();
-    ++measurements;
+  void add(const Eigen::Vector3d& place, const Eigen::Vector2d& residual, double w) {
+    weight += w;
+    weight2 += w * w;
+    normal += w * place * place.transpose();
+    normal2 += w * w * place * place.transpose();
+    right += w * place * residual.transpose();
+    squares += w * residual.squaredNorm();
   }
+  // As many of one weight would tell as much.
+  [[nodiscard]] double measurements() const { return weight2 > 0.0 ? weight * weight / weight2 : 0.0; }
+  // The weights say how much a residual counts, not how large its error is: so what the field explains of
+  // independent errors of one size is not its number of parameters, but a trace.
   [[nodiscard]] double f_statistic() const {
-    const double explained = normal.ldlt().solve(right).cwiseProduct(right).sum();
-    const int rest = 2 * measurements - kFieldParameters;
-    return (explained / kFieldParameters) / std::max((squares - explained) / rest, 1e-12);
+    const auto solver = normal.ldlt();
+    const double explained = solver.solve(right).cwiseProduct(right).sum();
+    const double by_chance = 2.0 * solver.solve(normal2).trace(), rest = 2.0 * weight - by_chance;
+    return (explained / by_chance) / std::max((squares - explained) / rest, 1e-12);
   }
 };
 
@@ -57,7 +65,7 @@ double coherence_of(const BundleProblem& problem) {
   double sum = 0.0;
   int count = 0;
   for (const Field& field : fields)
-    if (field.measurements >= kLeastMeasurements) sum += field.f_statistic(), ++count;
+    if (field.measurements() >= kLeastMeasurements) sum += field.f_statistic(), ++count;
   return count > 0 ? sum / count : 0.0;
 }
 

@@ -13,7 +13,7 @@ struct Soundness {
   // also how rough the scene is and how coarse its pixels.
   double mean_chi2 = 0;
   // How much more of its residuals an affine field over the image explains than it would of independent ones
-  // (the F statistic of its six parameters), mean over the free keyframes. About 1 (less by what the
+  // (an F statistic), mean over the free keyframes. About 1 (less by what the
   // adjustment has fitted itself) where nothing bends the map, however large the residuals are: errors of
   // patches know nothing of each other, those of a camera are a field. 0 where no keyframe has enough
   // measurements to tell.

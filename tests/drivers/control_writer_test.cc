@@ -95,13 +95,18 @@ TEST(ControlWriter, WaitsUntilNothingIsUnderWayAndForgetsIt) {
 
 TEST(ControlWriter, EndsWhileACallIsUnderWay) {
   SlowCamera camera;
+  std::thread later;
   {
     ControlWriter writer(camera.set());
     ASSERT_TRUE(writer.start(7, kBoth));
     camera.asked.acquire();
-    camera.may_go.release(2);
+    later = std::thread([&camera] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      camera.may_go.release(2);
+    });
   }
   EXPECT_EQ(camera.seen.size(), 2U);
+  later.join();
 }
 
 }  // namespace

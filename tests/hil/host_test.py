@@ -212,17 +212,20 @@ class Wheels(unittest.TestCase):
 class Quiet(unittest.TestCase):
     """Histograms as the kernel writes them."""
 
-    def complaint(self, heap="{ common_pid:          9 } hitcount:         77", function="do_sys_poll", times=300):
+    def complaint(self, heap="{ common_pid:          9 } hitcount:         77", function="do_sys_poll", times=300,
+                  only=""):
         waits = (f"# event histogram\n#\n\n{{ prev_pid:         11, stacktrace:\n         __schedule+0x2d5/0x9e0\n"
                  f"         {function}+0x1e/0x40\n}} hitcount:        {times}\n")
         calls = "{ common_pid:         11, id:          7 } hitcount:        300\n"
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "threads").write_text("9 fp-mapping\n11 fp-capture\n")
-            (folder / "trace.malloc").write_text("# event histogram\n\n" + heap + "\n")
+            for event in checks.HEAP:
+                text = heap if event == "malloc" else ""
+                (folder / f"trace.{event}").write_text(f"# event histogram\n\n{text}\n\nTotals:\n    Dropped: 0\n")
             (folder / "trace.sched_switch").write_text(waits)
             (folder / "trace.sys_enter").write_text(calls)
-            return checks.quiet(folder, types.SimpleNamespace(), "trace", "200", "fp-capture=do_sys_poll")
+            return checks.quiet(folder, types.SimpleNamespace(), "trace", "200", "fp-capture=do_sys_poll" + only)
 
     def test_good(self):
         self.assertEqual(self.complaint(),
@@ -235,6 +238,17 @@ class Quiet(unittest.TestCase):
     def test_other_wait(self):
         self.assertRegex(self.complaint(function="futex_wait")[0],
                          "^fp-capture slept 300 times elsewhere than in do_sys_poll: __schedule < futex_wait")
+
+    def test_other_call(self):
+        self.assertIsNone(self.complaint(only="=poll")[0])
+        self.assertRegex(self.complaint(only="=futex")[0], "^fp-capture made other calls than futex: poll 300")
+
+    def test_no_evidence(self):
+        with tempfile.TemporaryDirectory() as name:
+            path = pathlib.Path(name) / "trace.malloc"
+            self.assertRaisesRegex(checks.NotMade, "no trace.malloc", checks.histogram, path)
+            path.write_text("Totals:\n    Hits: 9\n    Entries: 1\n    Dropped: 3\n")
+            self.assertRaisesRegex(checks.NotMade, "trace.malloc: 3 events were dropped", checks.histogram, path)
 
     def test_seldom_or_not_there(self):
         self.assertRegex(self.complaint(times=199)[0], "^fp-capture slept 199 times, expected 200")

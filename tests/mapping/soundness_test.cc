@@ -49,6 +49,17 @@ TEST(Soundness, CoherenceIsSmallForErrorsThatKnowNothingOfEachOther) {
   }
 }
 
+TEST(Soundness, CoherenceIsSmallWhateverTheWeights) {
+  for (const std::uint64_t seed : {5U, 6U, 7U}) {
+    SceneOptions options;
+    options.seed = seed;
+    options.least_weight = 0.002;
+    const double coherence = adjusted(options, nowhere).coherence;
+    EXPECT_GT(coherence, 0.5);
+    EXPECT_LT(coherence, 1.3);
+  }
+}
+
 TEST(Soundness, CoherenceDoesNotKnowHowLargeTheErrorsAre) {
   SceneOptions options;
   options.noise_px = 0.1;

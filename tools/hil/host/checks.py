@@ -212,9 +212,12 @@ HEAP = ("malloc", "calloc", "realloc", "memalign", "aligned_alloc", "posix_memal
 def histogram(path):
     """[(keys, number)] of one of the kernel's histograms: keys by name, a stacktrace as its functions."""
     if not path.exists():
-        return []
+        raise NotMade(f"no {path.name}, expected one of the kernel's histograms")
+    text = path.read_text()
+    if (dropped := re.search(r"Dropped: ([1-9]\d*)", text)):
+        raise NotMade(f"{path.name}: {dropped[1]} events were dropped, expected none")
     found = []
-    for keys, number in re.findall(r"^\{ (.*?)\} hitcount: +(\d+)", path.read_text(), re.MULTILINE | re.DOTALL):
+    for keys, number in re.findall(r"^\{ (.*?)\} hitcount: +(\d+)", text, re.MULTILINE | re.DOTALL):
         scalars, _, stack = keys.partition("stacktrace:")
         one = {key: int(value) for key, value in re.findall(r"(\w+): +(\d+)", scalars)}
         one["stacktrace"] = re.findall(r"^\s+(\w[\w.]*)\+0x", stack, re.MULTILINE)
@@ -229,7 +232,8 @@ def waits_of(task, trace):
 
 
 def quiet(folder, stock, prefix, least, *threads):
-    """By the kernel's histograms, each thread (NAME=FUNCTION) made no heap call, and slept in FUNCTION alone."""
+    """By the kernel's histograms, each thread (NAME=FUNCTION) made no heap call, and slept in FUNCTION alone; as
+    NAME=FUNCTION=CALL it made no other system call either."""
     del stock
     tasks = {name: int(number) for number, name in (line.split() for line in
                                                      (folder / "threads").read_text().splitlines())}
@@ -238,7 +242,7 @@ def quiet(folder, stock, prefix, least, *threads):
     def trace(event):
         return folder / f"{prefix}.{event}"
 
-    for name, function in (thread.split("=") for thread in threads):
+    for name, function, *only in (thread.split("=") for thread in threads):
         task = tasks.get(name, -1)
         heap = sum(number for event in HEAP for keys, number in histogram(trace(event)) if keys["common_pid"] == task)
         if heap > 0:
@@ -250,8 +254,11 @@ def quiet(folder, stock, prefix, least, *threads):
         number = sum(times for _, times in waits)
         if number < int(least):
             return f"{name} slept {number} times, expected {least}", []
-        calls = {keys["id"]: times for keys, times in histogram(trace("sys_enter")) if keys["common_pid"] == task}
-        told = ", ".join(f"{SYSTEM_CALLS.get(call, call)} {times}" for call, times in sorted(calls.items()))
+        calls = {SYSTEM_CALLS.get(keys["id"], keys["id"]): times for keys, times in histogram(trace("sys_enter"))
+                 if keys["common_pid"] == task}
+        told = ", ".join(f"{call} {times}" for call, times in calls.items())
+        if only and set(calls) != set(only):
+            return f"{name} made other calls than {only[0]}: {told}", []
         figures.append(f"{name}: no heap call, {number} waits, all in {function}; its calls: {told}")
     return None, figures
 

@@ -1,7 +1,7 @@
 # Five minutes of tracking, odometry and LCM going out: the kernel's tracer sees no heap call and one wait a thread.
 #@ form: long
 #@ seconds: 900
-#@ check: quiet trace 2900 fp-capture=do_sys_poll fp-tracking=futex_wait_queue fp-output=futex_wait_queue
+#@ check: quiet trace 2900 fp-capture=do_sys_poll fp-tracking=futex_wait_queue=futex fp-output=futex_wait_queue
 #@ broken: every ioctl takes memory from the heap
 #@ broken_says: ^fp-capture .* heap calls
 frames=3100
@@ -20,8 +20,10 @@ mount -t tracefs tracefs $tracing || fail "no tracefs"
 cp "$root/symbol_places.so" /tmp
 # LD_PRELOAD only for a program that does nothing: its constructor says where the functions are.
 LD_PRELOAD=/tmp/symbol_places.so /bin/true > /tmp/places
-while read -r name file offset; do echo "p:heap/$name $file:$offset"; done < /tmp/places > $tracing/uprobe_events ||
-  fail "no uprobes: $(cat /tmp/places)"
+[ "$(wc -l < /tmp/places)" = 6 ] || fail "where the heap's functions are is not known: $(cat /tmp/places)"
+while read -r name file offset; do
+  echo "p:heap/$name $file:$offset" >> $tracing/uprobe_events || fail "no uprobe of $name at $file:$offset"
+done < /tmp/places
 
 untrace() {
   for trigger in $tracing/events/{heap/*,raw_syscalls/sys_enter,sched/sched_switch}/trigger; do

@@ -14,7 +14,6 @@ if [ -n "$BROKEN" ]; then
 fi
 start_daemon --set camera.driver=libcamera --set camera.device=0 --record /tmp/run.lcm --output /tmp/out.lcm
 wait_until 30 "the stream" says "streams RGB24"
-from=$(seconds)
 sleep 10
 stop_daemon
 figure "stopped in $stopped_in_s s"
