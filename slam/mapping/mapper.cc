@@ -242,7 +242,7 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   map_.update_covisibility(newest_);
   const bool optimised = optimise(newest_, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  if (optimised && config_.calibration.refine && fits_well()) refine_calibration();
+  if (optimised && config_.calibration.refine && soundness_.fits_well(settled_)) refine_calibration();
   const StageSpan span(listener_, Stage::kCulling);
   cull_redundant_keyframes(neighbours(newest_, static_cast<std::size_t>(config_.mapping.window_keyframes)),
                            newest_id_, &map_, &counts_);
@@ -520,7 +520,7 @@ void Mapper::update_settling(double scale_change) {
   constexpr double kSteady = 0.02;
   constexpr int kSteadyOptimisations = 3;
   const bool steady = std::fabs(std::log(scale_change)) < kSteady;
-  if (!is_sound() || calibrator_.contradicts_given()) {
+  if (!soundness_.holds(settled_) || calibrator_.contradicts_given()) {
     // Rolling shutter under fast rotation, a moving scene, a wrong calibration: the map bends to fit and its
     // poses are not what they claim, however many inliers they have.
     settled_ = false;
@@ -531,25 +531,6 @@ void Mapper::update_settling(double scale_change) {
   sound_run_ = std::min(sound_run_ + 1, kTrustedRun);
   steady_optimisations_ = steady ? steady_optimisations_ + 1 : 0;
   if (steady_optimisations_ >= kSteadyOptimisations && sound_run_ == kTrustedRun) settled_ = true;
-}
-
-bool Mapper::is_sound() const {
-  // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
-  // calibration the mean is 0.4 to 1.2. They may also have a pattern that is too small to matter, where the
-  // measurements are good: mean times coherence is 0.4 to 1.8 then, and up to 2.8 for a moment. A rolling
-  // shutter under fast rotation shows means of 1 to 3, and 1.5 to 15. Neither alone is enough: the map that
-  // it has bent for long fits well and coherently wrong. What held before may waver.
-  constexpr double kSoundChi2 = 1.3, kStillSoundChi2 = 1.5;
-  constexpr double kSoundPattern = 2.0, kStillSoundPattern = 3.0;
-  return soundness_.mean_chi2 <= (settled_ ? kStillSoundChi2 : kSoundChi2) &&
-         soundness_.pattern() <= (settled_ ? kStillSoundPattern : kSoundPattern);
-}
-
-bool Mapper::fits_well() const {
-  // How coherent the residuals are does not matter here: those of a wrong calibration are, and refinement is
-  // what finds it out.
-  constexpr double kGood = 1.0, kStillGood = 1.1;
-  return soundness_.mean_chi2 <= (settled_ ? kStillGood : kGood);
 }
 
 void Mapper::retire_map(std::int32_t map_id) {

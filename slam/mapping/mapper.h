@@ -69,8 +69,6 @@ class Mapper {
   void take_back();
   void refine_calibration();
   void update_settling(double scale_change);
-  [[nodiscard]] bool is_sound() const;
-  [[nodiscard]] bool fits_well() const;
 
   // From the pool; null where all views are in somebody's hands.
   std::shared_ptr<const LocalView> make_view(KeyframeHandle reference);

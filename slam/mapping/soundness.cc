@@ -83,6 +83,23 @@ double mean_chi2_of(const BundleProblem& problem) {
 
 }  // namespace
 
+bool Soundness::holds(bool held_before) const {
+  // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
+  // calibration the mean is 0.4 to 1.2. They may also have a pattern that is too small to matter, where the
+  // measurements are good: mean times coherence is 0.4 to 1.8 then, and up to 2.8 for a moment. A rolling
+  // shutter under fast rotation shows means of 1 to 3, and 1.5 to 15. Neither alone is enough: the map that
+  // it has bent for long fits well and coherently wrong.
+  constexpr double kChi2 = 1.3, kStillChi2 = 1.5;
+  constexpr double kPattern = 2.0, kStillPattern = 3.0;
+  return mean_chi2 <= (held_before ? kStillChi2 : kChi2) &&
+         pattern() <= (held_before ? kStillPattern : kPattern);
+}
+
+bool Soundness::fits_well(bool held_before) const {
+  constexpr double kGood = 1.0, kStillGood = 1.1;
+  return mean_chi2 <= (held_before ? kStillGood : kGood);
+}
+
 Soundness soundness_of(const BundleProblem& problem) {
   return {mean_chi2_of(problem), coherence_of(problem)};
 }
