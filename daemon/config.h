@@ -92,8 +92,9 @@ struct ThreadConfig {
 // Threaded runs.
 struct RealtimeConfig {
   bool lock_memory = true;
-  int stack_kb = 512;     // of each thread
-  int capture_queue = 2;  // images that may wait for tracking
+  int stack_kb = 512;           // of each thread
+  int capture_queue = 2;        // images that may wait for tracking
+  double least_features = 0.5;  // share of extractor.features, while tracking does not keep pace
   SchedulingPolicy policy = SchedulingPolicy::kFifo;
   ThreadConfig capture, tracking, output, mapping;
   double deadline_ms = 0;   // mid-exposure to output; 0: live a frame period, in replay none

@@ -127,6 +127,7 @@ std::vector<ConfigKey> make_keys() {
       boolean("realtime.lock_memory", FIELD(realtime.lock_memory)),
       integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),
       integer("realtime.capture_queue", "images", 1, 100, FIELD(realtime.capture_queue)),
+      number("realtime.least_features", "", 0.2, 1, FIELD(realtime.least_features)),
       enumeration("realtime.policy", {"fifo", "rr"}, FIELD(realtime.policy)),
       integer("realtime.capture_priority", "", 0, 90, FIELD(realtime.capture.priority)),
       integer("realtime.capture_core", "", -1, 1023, FIELD(realtime.capture.core)),

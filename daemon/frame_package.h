@@ -14,6 +14,7 @@ struct FrameChance {
   std::int64_t frames_dropped = 0;  // so far
   std::int64_t age_us = 0;          // from when the frame was due to its output
   std::int32_t capture_queue = 0, publish_queue = 0;
+  std::int32_t features_asked = 0;  // 0: as configured
 };
 
 struct FramePackage {

@@ -21,6 +21,7 @@ FrameReporter::FrameReporter(const Config& config, const Names& names, std::vect
     : status_rate_hz_(config.lcm.status_rate_hz),
       assumed_scale_(config.scale.assumed),
       deadline_ms_(config.realtime.deadline_ms),
+      features_(config.estimator.extractor.features),
       with_schedule_(with_schedule),
       sinks_(std::move(sinks)),
       publisher_(publisher),
@@ -119,6 +120,7 @@ void FrameReporter::publish_schedule(const FramePackage& package) {
   m.age_us = package.chance.age_us;
   m.capture_queue = package.chance.capture_queue;
   m.publish_queue = package.chance.publish_queue;
+  m.features_asked = package.chance.features_asked;
   publisher_->publish(ipc::kScheduleChannel, r.utime, m);
 }
 
@@ -161,6 +163,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.capture_queue = chance.capture_queue;
   s.mapping_queue = r.jobs_under_way;
   s.publish_queue = chance.publish_queue;
+  s.features_asked = chance.features_asked > 0 ? chance.features_asked : features_;
   s.capture_queue_max = std::max(s.capture_queue_max, s.capture_queue);
   s.mapping_queue_max = std::max(s.mapping_queue_max, s.mapping_queue);
   s.publish_queue_max = std::max(s.publish_queue_max, s.publish_queue);

@@ -47,6 +47,7 @@ class FrameReporter {
   std::atomic<double> status_rate_hz_;
   const double assumed_scale_;
   double deadline_ms_;
+  const int features_;  // as configured
   const bool with_schedule_;
   std::vector<PoseSink*> sinks_;
   Publisher* publisher_;

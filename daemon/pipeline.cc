@@ -34,7 +34,8 @@ Pipeline::Pipeline(const Config& config, const PipelineOptions& options, Capture
       images_(static_cast<std::size_t>(config.realtime.capture_queue), options.width_px, options.height_px),
       packages_(kPackages),
       notes_(kNotes),
-      counts_of_absence_(4) {
+      counts_of_absence_(4),
+      features_(config.estimator.extractor.features, config.realtime.least_features) {
   constexpr double kMegabyte = 1e6;
   const std::size_t rings = kPackages * sizeof(FramePackage) + kNotes * sizeof(Note);
   spdlog::info("memory {:<32} {:>9.3f} MB", "captured images",
@@ -136,9 +137,14 @@ void Pipeline::track_one(CapturedImage* image) {
   package->chance.capture_queue = static_cast<std::int32_t>(images_.waiting());
   package->chance.publish_queue = static_cast<std::int32_t>(packages_.size());
   package->chance.frames_dropped = image->frames_dropped;
+  package->chance.features_asked = features_.features();
+  const bool late = package->chance.capture_queue > 0 || image->frames_dropped > dropped_seen_;
+  dropped_seen_ = image->frames_dropped;
+  features_.note(late);
   const slam::ImageView view{image->image.data(), image->image.width_px, image->image.height_px,
                              image->image.width_px};
-  package->result = session_.estimator().track({image->utime, image->sequence, 0, view});
+  package->result =
+      session_.estimator().track({image->utime, image->sequence, 0, view, package->chance.features_asked});
   package->counts = session_.estimator().counts();
   package->in = image->in;
   package->due_s = image->due_s;

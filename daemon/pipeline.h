@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "daemon/capture_source.h"
+#include "daemon/feature_budget.h"
 #include "daemon/image_queue.h"
 #include "daemon/notifier.h"
 #include "daemon/outputs.h"
@@ -106,6 +107,8 @@ class Pipeline {
   slam::SpscRing<Note> notes_;
   slam::SpscRing<InputCounts> counts_of_absence_;
   FramePackage unpublished_;  // where the ring is full
+  FeatureBudget features_;    // tracking's
+  std::int64_t dropped_seen_ = 0;
 
   Notifier arrived_;                      // images; tracking and output wait here
   Notifier jobs_;                         // mapping waits here

@@ -17,7 +17,8 @@ Schedule::Schedule(const std::string& log) : log_(log) {
     while (reader.next(&event)) {
       schedule_t m;
       if (event.channel != ipc::kScheduleChannel || !ipc::decode(event.data, &m)) continue;
-      const FrameChance chance{m.frames_dropped, m.age_us, m.capture_queue, m.publish_queue};
+      const FrameChance chance{m.frames_dropped, m.age_us, m.capture_queue, m.publish_queue,
+                               m.features_asked};
       entries_.push_back({m.utime,
                           static_cast<std::uint64_t>(m.job),
                           {chance, static_cast<std::uint64_t>(m.replies_taken)}});

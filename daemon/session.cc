@@ -70,8 +70,7 @@ const FrameOutput& Session::process(const slam::FrameInput& input, const InputCo
   {
     const StageScope scope(&package_.clock, timing_t::STAGE_FRAME);
     estimator_.listen(&package_.clock);
-    package_.result = recorded == nullptr ? estimator_.process(input)
-                                          : estimator_.process_recorded(input, recorded->replies_taken);
+    package_.result = recorded == nullptr ? estimator_.process(input) : process_recorded(input, *recorded);
     estimator_.listen(nullptr);
   }
   if (!package_.result.followed()) package_.clock.forget(timing_t::STAGE_TRACKING);
@@ -91,6 +90,11 @@ void Session::remember(const slam::FrameResult& published, bool valid, bool with
   if (!valid) return;
   ++end_.frames_valid;
   if (with_time) end_.live_utimes.push_back(published.utime);
+}
+
+const slam::FrameResult& Session::process_recorded(slam::FrameInput input, const RecordedChance& recorded) {
+  input.most_features = recorded.chance.features_asked;
+  return estimator_.process_recorded(input, recorded.replies_taken);
 }
 
 const RunEnd& Session::finish(const InputCounts& in) {

@@ -50,6 +50,7 @@ class Session {
   [[nodiscard]] std::size_t pool_bytes() const { return pool_bytes_; }
 
  private:
+  const slam::FrameResult& process_recorded(slam::FrameInput input, const RecordedChance& recorded);
   void publish_results(const InputCounts& in);
   void publish_landmarks();
 

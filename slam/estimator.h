@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/image/extractor.h"
 #include "slam/stages.h"
 
 namespace farpoint::slam {
@@ -43,6 +44,8 @@ struct FrameInput {
   std::int64_t sequence = 0;
   int camera = 0;
   ImageView image;
+  // Where time is short: fewer features than configured.
+  int most_features = Extractor::kAllFeatures;
 };
 
 // Features measured elsewhere: the feature-level simulator's way in. `image` must outlive the estimator's use

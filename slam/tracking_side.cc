@@ -156,7 +156,7 @@ const FrameResult& TrackingSide::track(const FrameInput& input, const ReplyLimit
   }
   {
     const StageSpan span(listener_, Stage::kExtraction);
-    extractor_.extract(pixels->pyramid, {}, &frame->set);
+    extractor_.extract(pixels->pyramid, {}, &frame->set, input.most_features);
     frame->image = pixels;
     frame->grid.build(frame->set.features);
   }

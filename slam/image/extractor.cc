@@ -42,7 +42,7 @@ struct Extractor::Workspace {
   void detect(const Pyramid& pyramid, int l, const ImageView& mask);
   void scan(const ImageView& image, float scale, const ImageView& mask, PixelBox box, int threshold,
             std::vector<Corner>* corners);
-  void choose(const Pyramid& pyramid);
+  void choose(const Pyramid& pyramid, int most);
   void blur(const ImageView& image);
   void describe(const Pyramid& pyramid, int l, FeatureSet* out);
 
@@ -155,11 +155,11 @@ void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView
   }
 }
 
-void Extractor::Workspace::choose(const Pyramid& pyramid) {
+void Extractor::Workspace::choose(const Pyramid& pyramid, int most) {
   for (std::size_t l = 0; l < levels.size(); ++l) {
     available[l] = static_cast<int>(levels[l].corners.size());
   }
-  share_quota(options.features, weights, available, quota);
+  share_quota(std::min(options.features, most), weights, available, quota);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     Level& level = levels[l];
     const ImageView image = pyramid.level(static_cast<int>(l));
@@ -226,7 +226,7 @@ Extractor::Extractor(int width_px, int height_px, const PyramidOptions& pyramid,
 
 Extractor::~Extractor() = default;
 
-void Extractor::extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out) {
+void Extractor::extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out, int most) {
   Workspace& w = *workspace_;
   w.kernels = &active_kernels();
   out->features.clear();
@@ -234,7 +234,7 @@ void Extractor::extract(const Pyramid& pyramid, const ImageView& mask, FeatureSe
   out->features.reserve(static_cast<std::size_t>(w.options.features));
   out->descriptors.reserve(static_cast<std::size_t>(w.options.features));
   for (int l = 0; l < pyramid.levels(); ++l) w.detect(pyramid, l, mask);
-  w.choose(pyramid);
+  w.choose(pyramid, most);
   for (int l = 0; l < pyramid.levels(); ++l) w.describe(pyramid, l, out);
 }
 

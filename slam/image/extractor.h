@@ -1,6 +1,7 @@
 // FAST corners spread over the image, oriented, with binary descriptors.
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "slam/image/feature.h"
@@ -19,6 +20,8 @@ struct ExtractorOptions {
 // capacity).
 class Extractor {
  public:
+  static constexpr int kAllFeatures = std::numeric_limits<int>::max();
+
   Extractor(int width_px, int height_px, const PyramidOptions& pyramid, const ExtractorOptions& options);
   ~Extractor();
   Extractor(const Extractor&) = delete;
@@ -26,8 +29,8 @@ class Extractor {
 
   // Corners of all levels into *out, ordered by level, then row-major by cell. `mask` (same size as level 0,
   // may be empty): pixels with 0 give no corner. Features are spread over the image: no region may take the
-  // quota of another.
-  void extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out);
+  // quota of another. At most `most` features, where that is less than the options say.
+  void extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out, int most = kAllFeatures);
 
  private:
   struct Workspace;

@@ -23,6 +23,7 @@ schedule_t message(std::int64_t utime, std::int64_t replies, std::int64_t job) {
   m.job = job;
   m.frames_dropped = 3;
   m.age_us = 4000;
+  m.features_asked = 960;
   m.capture_queue = 1;
   m.publish_queue = 2;
   return m;
@@ -44,6 +45,7 @@ TEST(Schedule, GivesWhatEachFrameMetAndKnowsTheDropped) {
   EXPECT_EQ(first->replies_taken, 0U);
   EXPECT_EQ(first->chance.frames_dropped, 3);
   EXPECT_EQ(first->chance.age_us, 4000);
+  EXPECT_EQ(first->chance.features_asked, 960);
   EXPECT_EQ(first->chance.capture_queue, 1);
   EXPECT_EQ(first->chance.publish_queue, 2);
   EXPECT_NO_THROW(schedule.check(result(0, 1)));

@@ -51,6 +51,18 @@ TEST(Extractor, GivesTheWantedNumberInTheDocumentedOrder) {
   }
 }
 
+TEST(Extractor, GivesFewerWhereFewerAreAskedFor) {
+  const OwnedImage image = testing::rectangles(640, 400, 700, 1);
+  Pyramid pyramid(image.width, image.height, {});
+  pyramid.build(image.view());
+  Extractor extractor(image.width, image.height, {}, {.features = 700});
+  FeatureSet set;
+  extractor.extract(pyramid, {}, &set, 400);
+  EXPECT_TRUE(same(set, extract(image, {.features = 400})));
+  extractor.extract(pyramid, {}, &set, 5000);
+  EXPECT_TRUE(same(set, extract(image, {.features = 700})));
+}
+
 // A corner sits on a whole pixel of its level, a patch away from the edge, and is one by its level's pixels.
 TEST(Extractor, CornersSitOnWholePixelsOfTheirLevel) {
   const OwnedImage image = testing::rectangles(500, 380, 500, 2);

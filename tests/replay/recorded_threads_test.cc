@@ -2,10 +2,14 @@
 // repetition.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "ipc/channels.h"
+#include "ipc/log.h"
+#include "ipc/message.h"
 #include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
 
@@ -43,6 +47,35 @@ class RecordedThreadsOfPrograms : public testing::Test {
 TEST_F(RecordedThreadsOfPrograms, StayWithinTheirMemory) {
   ASSERT_EQ(replay("--speed 2 --output " + out), 0);
   EXPECT_EQ(evaluate(" --expect 'out.peak_resident_mb <= 200'"), 0);
+}
+
+// How many features each tracked frame was allowed, by the schedule of the run.
+std::vector<int> features_asked(const std::string& log) {
+  std::vector<int> asked;
+  ipc::LogReader reader(log);
+  ipc::LogEvent event;
+  while (reader.next(&event)) {
+    schedule_t m;
+    if (event.channel == ipc::kScheduleChannel && ipc::decode(event.data, &m))
+      asked.push_back(m.features_asked);
+  }
+  return asked;
+}
+
+// More images than any machine tracks: the newest win, each costs less, and the run can be repeated all the
+// same.
+TEST_F(RecordedThreadsOfPrograms, UnderOverloadFramesHaveFewerFeatures) {
+  ASSERT_EQ(replay("--speed 200 --output " + out + " --live-trajectory " + work.path("live.tum")), 0);
+  EXPECT_TRUE(dropped_frames());
+  const std::vector<int> asked = features_asked(out);
+  ASSERT_FALSE(asked.empty());
+  EXPECT_EQ(asked.front(), 1500);
+  EXPECT_EQ(*std::min_element(asked.begin(), asked.end()), 750);
+  ASSERT_EQ(replay("--schedule recorded --schedule-log " + out + " --output " + work.path("again.lcm") +
+                   " --live-trajectory " + work.path("live2.tum")),
+            0);
+  EXPECT_EQ(features_asked(work.path("again.lcm")), asked);
+  EXPECT_EQ(run("cmp " + work.path("live.tum") + " " + work.path("live2.tum")), 0);
 }
 
 // The long form: at the camera's pace, on an idle machine and with every core loaded at normal priority.

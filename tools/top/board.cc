@@ -140,9 +140,10 @@ std::string Board::time_lines(double now_s) const {
 std::string Board::count_lines() const {
   const status_t& s = *status_;
   std::string text;
-  text += fmt::format("queues    capture {} (most {})   mapping {} ({})   publish {} ({})\n", s.capture_queue,
-                      s.capture_queue_max, s.mapping_queue, s.mapping_queue_max, s.publish_queue,
-                      s.publish_queue_max);
+  text += fmt::format(
+      "queues    capture {} (most {})   mapping {} ({})   publish {} ({})   features a frame {}\n",
+      s.capture_queue, s.capture_queue_max, s.mapping_queue, s.mapping_queue_max, s.publish_queue,
+      s.publish_queue_max, s.features_asked);
   text += fmt::format(
       "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
       s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
