@@ -12,8 +12,8 @@
 namespace farpoint::daemon {
 namespace {
 
-void require_name(const std::string& problem) {
-  if (!problem.empty()) throw ConfigError("configuration: camera.device: " + problem);
+void require_name(const std::string& problem, const std::string& key) {
+  if (!problem.empty()) throw ConfigError("configuration: " + key + ": " + problem);
 }
 
 #if !FARPOINT_WITH_V4L2 || !FARPOINT_WITH_LIBCAMERA
@@ -23,9 +23,10 @@ void require_name(const std::string& problem) {
 }
 #endif
 
-std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::CameraOptions& options) {
+std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::CameraOptions& options,
+                                           [[maybe_unused]] const std::string& key) {
 #if FARPOINT_WITH_V4L2
-  require_name(drivers::CameraPath::check(options.device));
+  require_name(drivers::CameraPath::check(options.device), key);
   auto device = std::make_unique<drivers::V4l2Device>(options, std::make_unique<drivers::LinuxV4l2System>());
   return std::make_unique<drivers::LiveCamera>(options, std::move(device));
 #else
@@ -33,9 +34,10 @@ std::unique_ptr<drivers::Camera> make_v4l2([[maybe_unused]] const drivers::Camer
 #endif
 }
 
-std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::CameraOptions& options) {
+std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::CameraOptions& options,
+                                                [[maybe_unused]] const std::string& key) {
 #if FARPOINT_WITH_LIBCAMERA
-  require_name(drivers::LibcameraDevice::check(options.device));
+  require_name(drivers::LibcameraDevice::check(options.device), key);
   std::string problem;
   auto system = drivers::load_libcamera(drivers::libcamera_module_path(), &problem);
   if (!system)
@@ -49,13 +51,13 @@ std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::
 
 }  // namespace
 
-std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver,
-                                             const drivers::CameraOptions& options) {
+std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver, const drivers::CameraOptions& options,
+                                             const std::string& key) {
   switch (driver) {
     case CameraDriverChoice::kV4l2:
-      return make_v4l2(options);
+      return make_v4l2(options, key);
     case CameraDriverChoice::kLibcamera:
-      return make_libcamera(options);
+      return make_libcamera(options, key);
   }
   return nullptr;
 }

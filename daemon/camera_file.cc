@@ -76,4 +76,23 @@ calibration_t calibration_of(const CameraFile& camera, const std::string& name) 
   return message;
 }
 
+calibration_t read_stereo_calibration(const std::filesystem::path& first,
+                                      const std::filesystem::path& second) {
+  const CameraFile cameras[] = {read_camera_file(first), read_camera_file(second)};
+  const std::filesystem::path* const files[] = {&first, &second};
+  for (int i = 0; i < 2; ++i) {
+    if (cameras[i].T_body_camera) continue;
+    throw InputError(
+        files[i]->string() +
+        ": no T_body_camera, expected it in the files of both cameras of a stereo pair, to place them "
+        "on one body");
+  }
+  calibration_t message = calibration_of(cameras[0], "left");
+  const CameraFile& other = cameras[1];
+  message.cameras.push_back(
+      camera_message("right", other.parameters, *other.T_body_camera, other.rate_hz, other.row_time_s));
+  message.ncameras = 2;
+  return message;
+}
+
 }  // namespace farpoint::daemon

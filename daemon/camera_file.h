@@ -25,5 +25,9 @@ struct CameraFile {
 
 // The calibration of a vehicle with this one camera, as a log carries it.
 [[nodiscard]] calibration_t calibration_of(const CameraFile& camera, const std::string& name);
+// The same with two, CAMERA_0 and CAMERA_1, read from their files. Throws InputError also where one of them
+// has no T_body_camera: which body they share, and how they stand to each other, cannot be guessed.
+[[nodiscard]] calibration_t read_stereo_calibration(const std::filesystem::path& first,
+                                                    const std::filesystem::path& second);
 
 }  // namespace farpoint::daemon

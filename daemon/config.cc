@@ -205,6 +205,29 @@ std::string read_file(const std::string& path) {
   return text;
 }
 
+std::string place_of(const std::string& key, const ConfigOrigins& origins) {
+  const auto set_at = origins.find(key);
+  return set_at == origins.end() ? "built-in defaults" : set_at->second;
+}
+
+void check_second_camera(const CameraConfig& camera, const ConfigOrigins& origins) {
+  if (!camera.has_second()) return;
+  const std::string device = "camera.second_device: " + quote(camera.second_device);
+  if (camera.second_device == camera.device)
+    fail(place_of("camera.second_device", origins), device + ", expected another camera than camera.device");
+  // libcamera allows one manager of cameras in a process, and ours has one for each camera.
+  if (camera.driver == CameraDriverChoice::kLibcamera)
+    fail(place_of("camera.second_device", origins),
+         device + ", expected 'none' with camera.driver libcamera");
+  constexpr double kMicrosPerSecond = 1e6;
+  if (camera.rate_hz > 0.0 && 2.0 * camera.pair_tolerance_us >= kMicrosPerSecond / camera.rate_hz) {
+    fail(place_of("camera.pair_tolerance_us", origins),
+         fmt::format(
+             "camera.pair_tolerance_us: {}, expected less than half a frame period of camera.rate_hz ({})",
+             camera.pair_tolerance_us, camera.rate_hz));
+  }
+}
+
 }  // namespace
 
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins) {
@@ -258,13 +281,13 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   require_not_above("tracking.min_inliers", "tracking.degraded_inliers");
   require_not_above("keyframes.min_interval_frames", "keyframes.max_interval_frames");
   if (config.camera.rate_hz > 0.0 && config.camera.lost_after_s < 1.5 / config.camera.rate_hz) {
-    const auto set_at = origins.find("camera.lost_after_s");
-    fail(set_at == origins.end() ? "built-in defaults" : set_at->second,
+    fail(place_of("camera.lost_after_s", origins),
          "camera.lost_after_s: " + value_text(config, "camera.lost_after_s") +
              ", expected at least one and a half frame periods of camera.rate_hz (" +
              value_text(config, "camera.rate_hz") + ")");
   }
   require_not_above("camera.exposure_short_us", "camera.exposure_max_us");
+  check_second_camera(config.camera, origins);
   require_not_above("mapping.quick_view_delay_frames", "mapping.full_view_delay_frames");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");

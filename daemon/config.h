@@ -49,6 +49,9 @@ struct CameraConfig {
   CameraDriverChoice driver = CameraDriverChoice::kV4l2;
   std::string device = "/dev/video0";
   std::string calibration = "/etc/farpoint/camera.yaml";
+  std::string second_device = "none";
+  std::string second_calibration = "/etc/farpoint/camera_1.yaml";
+  int pair_tolerance_us = 5000;
   CameraFormatChoice format = CameraFormatChoice::kAuto;
   double rate_hz = 30;
   int buffers = 4;
@@ -57,6 +60,8 @@ struct CameraConfig {
   double stall_s = 1.0;        // silent for so long: started anew
   double lost_after_s = 0.25;  // silent for so long: 'no_camera'
   ExposureConfig exposure;
+
+  [[nodiscard]] bool has_second() const { return second_device != "none"; }
 };
 
 struct ScaleConfig {

@@ -11,6 +11,8 @@ struct InputCounts {
   std::int64_t messages_undecodable = 0, log_damages = 0;
   // Live cameras: gaps in the driver's numbers, buffers it called damaged, times it went away or fell silent.
   std::int64_t missing = 0, flagged = 0, camera_losses = 0;
+  // Live with a second camera: images of the two matched by time, and those of either without a partner.
+  std::int64_t stereo_pairs = 0, stereo_left_alone = 0, stereo_right_alone = 0;
 };
 
 // What could not be sent; the bus is counted here because its sink is no message sink.

@@ -144,6 +144,9 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.images_missing = in.missing;
   s.images_flagged = in.flagged;
   s.camera_losses = in.camera_losses;
+  s.stereo_pairs = in.stereo_pairs;
+  s.stereo_left_alone = in.stereo_left_alone;
+  s.stereo_right_alone = in.stereo_right_alone;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
   s.messages_undecodable = in.messages_undecodable;

@@ -16,6 +16,7 @@
 #include "daemon/logging.h"
 #include "daemon/outputs.h"
 #include "daemon/recorder.h"
+#include "daemon/second_camera.h"
 #include "daemon/service_manager.h"
 #include "daemon/session.h"
 #include "daemon/stop_signal.h"
@@ -51,7 +52,9 @@ calibration_t read_calibration(const Config& config) {
   if (config.camera.index != 0)
     throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
                       ", expected 0 for a live camera");
-  return calibration_of(read_camera_file(config.camera.calibration), "camera");
+  const CameraConfig& camera = config.camera;
+  if (camera.has_second()) return read_stereo_calibration(camera.calibration, camera.second_calibration);
+  return calibration_of(read_camera_file(camera.calibration), "camera");
 }
 
 void say(const drivers::CameraEvent& event, const std::string& device) {
@@ -76,10 +79,25 @@ void say(const drivers::CameraEvent& event, const std::string& device) {
   }
 }
 
+// Tells what runs on a thread of its own to stop, when the scope ends.
+template <typename Runner>
+class StopAtEnd {
+ public:
+  explicit StopAtEnd(Runner* runner) : runner_(runner) {}  // null: nothing runs
+  ~StopAtEnd() {
+    if (runner_ != nullptr) runner_->stop();
+  }
+  StopAtEnd(const StopAtEnd&) = delete;
+  StopAtEnd& operator=(const StopAtEnd&) = delete;
+
+ private:
+  Runner* runner_;
+};
+
 // Everything of one live run, made in the order in which it depends on each other.
 class LiveRun {
  public:
-  LiveRun(const Options& options, const Config& config, std::unique_ptr<drivers::Camera> camera);
+  LiveRun(const Options& options, const Config& config, LiveEnvironment* environment);
 
   int run(const std::function<Config()>& reload, const ThreadHooks& hooks);
 
@@ -89,6 +107,8 @@ class LiveRun {
   [[nodiscard]] bool wants_results() const {
     return !options_.output.empty() || !options_.trajectory.empty();
   }
+  [[nodiscard]] std::unique_ptr<SecondCamera> open_second(std::unique_ptr<drivers::Camera> camera) const;
+  void open_recorder();
   void run_threads(const ThreadHooks& hooks);
   void tick(const std::function<Config()>& reload);
   void take_over(const std::function<Config()>& reload);
@@ -107,6 +127,7 @@ class LiveRun {
   Outputs outputs_;
   std::optional<Recorder> recorder_;
   std::optional<ControlSocket> control_;
+  std::unique_ptr<SecondCamera> second_;  // null: none is configured
   CameraSource source_;
   std::unique_ptr<Session> session_;
   RealtimeReport realtime_;
@@ -116,29 +137,45 @@ class LiveRun {
   slam::State state_said_ = slam::State::kStarting;
 };
 
-LiveRun::LiveRun(const Options& options, const Config& config, std::unique_ptr<drivers::Camera> camera)
+LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* environment)
     : options_(options),
       config_(config),
       calibration_(read_calibration(config)),
       outputs_(options, config, Outputs::Use::kLive),
-      source_(camera ? std::move(camera)
-                     : make_camera(config.camera.driver, camera_options(config, calibration_))),
+      second_(open_second(std::move(environment->second_camera))),
+      source_(environment->camera ? std::move(environment->camera)
+                                  : make_camera(config.camera.driver, camera_options(config, calibration_, 0),
+                                                "camera.device")),
       session_(open_session()),
       realtime_(config.realtime),
       pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
   open_control();
-  if (options_.record.empty()) return;
+  if (second_) source_.pair_with(second_.get(), config.camera.pair_tolerance_us);
+  if (!options.record.empty()) open_recorder();
+}
+
+std::unique_ptr<SecondCamera> LiveRun::open_second(std::unique_ptr<drivers::Camera> camera) const {
+  if (!config_.camera.has_second()) return nullptr;
+  if (!camera)
+    camera = make_camera(config_.camera.driver, camera_options(config_, calibration_, SecondCamera::kIndex),
+                         "camera.second_device");
+  return std::make_unique<SecondCamera>(std::move(camera));
+}
+
+void LiveRun::open_recorder() {
   try {
-    recorder_.emplace(options_.record, calibration_, config_.camera.index);
+    recorder_.emplace(options_.record, calibration_);
   } catch (const std::runtime_error& error) {
     throw UsageError(error.what());
   }
   source_.record_to(&*recorder_);
+  if (second_) second_->record_to(&*recorder_);
 }
 
 std::unique_ptr<Session> LiveRun::open_session() {
-  spdlog::info("farpointd {}, configuration {:016x}, live from {} {}", build_text(), config_hash(config_),
-               value_text(config_, "camera.driver"), config_.camera.device);
+  const std::string second = config_.camera.has_second() ? " and " + config_.camera.second_device : "";
+  spdlog::info("farpointd {}, configuration {:016x}, live from {} {}{}", build_text(), config_hash(config_),
+               value_text(config_, "camera.driver"), config_.camera.device, second);
   // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
   config_.estimator.capacity.whole_trajectory = wants_results();
   std::unique_ptr<Session> session = make_session(config_, calibration_, &outputs_, !options_.output.empty());
@@ -185,23 +222,25 @@ int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks
 }
 
 void LiveRun::run_threads(const ThreadHooks& hooks) {
+  // However it ends, these threads must be told before they are joined; the recorder's after all that record.
   std::optional<Thread> recording;
   if (recorder_)
     recording.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, &realtime_,
                       [this] { recorder_->run(); });
-  // However it ends, the recorder's thread must be told.
-  struct StopRecorder {
-    std::optional<Recorder>& recorder;
-    ~StopRecorder() {
-      if (recorder) recorder->stop();
-    }
-  } stop_recorder{recorder_};
+  const StopAtEnd stop_recorder(recorder_ ? &*recorder_ : nullptr);
+  std::optional<Thread> second_capture;
+  if (second_)
+    second_capture.emplace(SecondCamera::kThread, config_.realtime, config_.realtime.capture, &realtime_,
+                           [this] { second_->run(); });
+  const StopAtEnd stop_second(second_.get());
   pipeline_.run(hooks);
   manager_.stopping();
 }
 
 void LiveRun::tick(const std::function<Config()>& reload) {
   for (drivers::CameraEvent event; source_.take_event(&event);) say(event, config_.camera.device);
+  if (second_)
+    for (drivers::CameraEvent event; second_->take_event(&event);) say(event, config_.camera.second_device);
   if (ReloadOnSignal::take()) take_over(reload);
   if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
@@ -252,6 +291,7 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
     set_log_level(config_.log.level);
     session_->reporter().set_status_rate(config_.lcm.status_rate_hz);
     source_.set_exposure(exposure_options(config_.camera.exposure));
+    if (second_) second_->set_exposure(exposure_options(config_.camera.exposure));
     spdlog::info("configuration read again{}", restart.empty() ? "" : "; after a restart only: " + restart);
   } catch (const std::exception& error) {
     spdlog::error("configuration not taken over: {}", error.what());
@@ -275,11 +315,11 @@ int LiveRun::conclude() {
 
 }  // namespace
 
-drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration) {
+drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration, int index) {
   const CameraConfig& c = config.camera;
-  const camera_calibration_t& camera = calibration.cameras.front();
+  const camera_calibration_t& camera = calibration.cameras.at(static_cast<std::size_t>(index));
   drivers::CameraOptions o;
-  o.device = c.device;
+  o.device = index == SecondCamera::kIndex ? c.second_device : c.device;
   o.width_px = camera.width;
   o.height_px = camera.height;
   o.rate_hz = c.rate_hz;
@@ -304,7 +344,7 @@ std::string keys_that_need_a_restart(const Config& running, const Config& wanted
 
 int live(const Options& options, const Config& config, const std::function<Config()>& reload,
          LiveEnvironment environment) {
-  LiveRun run(options, config, std::move(environment.camera));
+  LiveRun run(options, config, &environment);
   return run.run(reload, environment.hooks);
 }
 

@@ -13,7 +13,8 @@ namespace farpoint::daemon {
 
 // What tests put in the machine's place.
 struct LiveEnvironment {
-  std::unique_ptr<drivers::Camera> camera;  // null: the one that is configured
+  // Null: the one that is configured. The second is used where one is configured.
+  std::unique_ptr<drivers::Camera> camera, second_camera;
   ThreadHooks hooks;
 };
 
@@ -23,8 +24,9 @@ struct LiveEnvironment {
 int live(const Options& options, const Config& config, const std::function<Config()>& reload,
          LiveEnvironment environment = {});
 
-// The options of the camera driver.
-[[nodiscard]] drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration);
+// The driver's options of one camera: 0 the tracked one, 1 the second.
+[[nodiscard]] drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration,
+                                                    int index);
 
 // Names of the keys whose values differ and that do not take effect before a restart; empty: none.
 [[nodiscard]] std::string keys_that_need_a_restart(const Config& running, const Config& wanted);

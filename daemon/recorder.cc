@@ -6,34 +6,34 @@
 
 namespace farpoint::daemon {
 
-Recorder::Recorder(const std::string& path, const calibration_t& calibration, int camera_index)
-    : width_px_(calibration.cameras.at(static_cast<std::size_t>(camera_index)).width),
-      height_px_(calibration.cameras.at(static_cast<std::size_t>(camera_index)).height),
-      channel_(ipc::kCameraChannelPrefix + std::to_string(camera_index)),
-      log_(path),
-      images_(kWaiting,
-              Image{0, 0, -1, -1.0F,
-                    std::vector<std::uint8_t>(static_cast<std::size_t>(width_px_ * height_px_), 0)}) {
-  log_.write_message(ipc::kCalibrationChannel, calibration.utime, calibration);
-  message_.camera = camera_index;
-  message_.width = message_.row_stride = width_px_;
-  message_.height = height_px_;
-  message_.pixel_format = image_t::PIXEL_FORMAT_GREY;
-  message_.size = width_px_ * height_px_;
+Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration)
+    : name(ipc::kCameraChannelPrefix + std::to_string(camera)),
+      images(kWaiting, Image{{},
+                             std::vector<std::uint8_t>(
+                                 static_cast<std::size_t>(calibration.width * calibration.height), 0)}) {
+  message.camera = camera;
+  message.width = message.row_stride = calibration.width;
+  message.height = calibration.height;
+  message.pixel_format = image_t::PIXEL_FORMAT_GREY;
+  message.size = calibration.width * calibration.height;
 }
 
-void Recorder::offer(const CapturedImage& image) {
-  Image* slot = images_.begin_push();
+Recorder::Recorder(const std::string& path, const calibration_t& calibration) : log_(path) {
+  for (const camera_calibration_t& camera : calibration.cameras)
+    channels_.emplace_back(static_cast<int>(channels_.size()), camera);
+  log_.write_message(ipc::kCalibrationChannel, calibration.utime, calibration);
+}
+
+void Recorder::offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame) {
+  slam::SpscRing<Image>& images = channels_[static_cast<std::size_t>(camera)].images;
+  Image* slot = images.begin_push();
   if (slot == nullptr) {
     left_out_.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  slot->utime = image.utime;
-  slot->sequence = image.sequence;
-  slot->exposure_us = image.exposure_us;
-  slot->gain = image.gain;
-  std::copy(image.image.pixels.begin(), image.image.pixels.end(), slot->pixels.begin());
-  images_.end_push();
+  slot->frame = frame;
+  std::copy(image.pixels.begin(), image.pixels.end(), slot->pixels.begin());
+  images.end_push();
   arrived_.notify();
 }
 
@@ -48,25 +48,35 @@ void Recorder::run() {
 }
 
 void Recorder::write_all() {
-  while (Image* image = images_.front()) {
-    message_.utime = image->utime;
-    message_.sequence = image->sequence;
-    message_.exposure_us = image->exposure_us;
-    message_.gain = image->gain;
-    message_.data.assign(image->pixels.begin(), image->pixels.end());
-    images_.pop();
-    const bool stored = log_.write_message(channel_, message_.utime, message_);
+  while (Channel* channel = oldest()) {
+    Image* image = channel->images.front();
+    image_t& message = channel->message;
+    message.utime = image->frame.utime;
+    message.sequence = image->frame.sequence;
+    message.exposure_us = image->frame.exposure_us;
+    message.gain = image->frame.gain;
+    message.data.assign(image->pixels.begin(), image->pixels.end());
+    channel->images.pop();
+    const bool stored = log_.write_message(channel->name, message.utime, message);
     (stored ? written_ : left_out_).fetch_add(1, std::memory_order_relaxed);
   }
+}
+
+Recorder::Channel* Recorder::oldest() {
+  Channel* found = nullptr;
+  std::int64_t found_utime = 0;
+  for (Channel& channel : channels_) {
+    const Image* image = channel.images.front();
+    if (image == nullptr || (found != nullptr && image->frame.utime >= found_utime)) continue;
+    found = &channel;
+    found_utime = image->frame.utime;
+  }
+  return found;
 }
 
 void Recorder::stop() {
   stop_.store(true, std::memory_order_release);
   arrived_.notify();
-}
-
-std::size_t Recorder::bytes() const {
-  return kWaiting * images_.sample().pixels.capacity();
 }
 
 }  // namespace farpoint::daemon

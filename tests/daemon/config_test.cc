@@ -194,6 +194,25 @@ TEST(ConfigMistakes, RelationsNameThePlaceOfTheKeyThatWasSet) {
             "--set: tracking.min_inliers: 30, expected at most tracking.degraded_inliers (10)");
 }
 
+TEST(ConfigMistakes, TheSecondCameraFitsTheFirst) {
+  const std::string second = "camera:\n  second_device: /dev/video2\n";
+  EXPECT_EQ(error_of(second), "");
+  EXPECT_EQ(error_of(second + "  device: /dev/video2\n"),
+            "f.yaml:2: camera.second_device: '/dev/video2', expected another camera than camera.device");
+  EXPECT_EQ(error_of(second + "  driver: libcamera\n"),
+            "f.yaml:2: camera.second_device: '/dev/video2', expected 'none' with camera.driver libcamera");
+  EXPECT_EQ(error_of(second + "  pair_tolerance_us: 16667\n"),
+            "f.yaml:3: camera.pair_tolerance_us: 16667, expected less than half a frame period of "
+            "camera.rate_hz (30)");
+  EXPECT_EQ(error_of(second + "  pair_tolerance_us: 16666\n"), "");
+  EXPECT_EQ(error_of(second + "  rate_hz: 100\n"),
+            "built-in defaults: camera.pair_tolerance_us: 5000, expected less than half a frame period of "
+            "camera.rate_hz (100)");
+  // Where there is no rate, or no second camera, there is nothing to hold it against.
+  EXPECT_EQ(error_of(second + "  rate_hz: 0\n  pair_tolerance_us: 90000\n"), "");
+  EXPECT_EQ(error_of("camera:\n  driver: libcamera\n  pair_tolerance_us: 90000\n"), "");
+}
+
 TEST(ConfigMistakes, Settings) {
   EXPECT_EQ(error_of_setting("tracking.min_inliers"),
             "--set: 'tracking.min_inliers', expected dotted.key=value, like tracking.min_inliers=30");

@@ -3,126 +3,25 @@
 #include "daemon/live.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <csignal>
-#include <fstream>
 #include <thread>
 
 #include "daemon/replay.h"
-#include "daemon/stage_clock.h"
 #include "ipc/candump.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
+#include "tests/daemon/live_fixture.h"
 #include "tests/daemon/notify_socket.h"
-#include "tests/daemon/synthetic_log.h"
 #include "tests/ipc/log_events.h"
-#include "tests/ipc/scratch.h"
 
 namespace farpoint::daemon {
 namespace {
 
-constexpr double kRate_hz = 20.0;
-constexpr int kFrames = 50;
-
-// Shows synthetic images at their rate, and is away from `away_from_s` to `away_to_s` after its first image.
-class FilmCamera final : public drivers::Camera {
- public:
-  FilmCamera() {
-    test::SyntheticLog log;
-    for (int i = 0; i < kFrames; ++i) images_.push_back(test::synthetic_image(log, i));
-  }
-  void leave(double from_s, double to_s) {
-    away_from_s_ = from_s;
-    away_to_s_ = to_s;
-  }
-
-  bool next(int timeout_ms, ipc::GreyImage* image, drivers::CameraFrame* frame) override {
-    const double now_s = steady_s();
-    if (began_s_ < 0.0) began_s_ = now_s;
-    streaming_ = now_s - began_s_ < away_from_s_ || now_s - began_s_ >= away_to_s_;
-    const double due_s = began_s_ + static_cast<double>(shown_) / kRate_hz;
-    const double wait_s = streaming_ ? due_s - now_s : 1e-3 * timeout_ms;
-    std::this_thread::sleep_for(std::chrono::duration<double>(std::clamp(wait_s, 0.0, 1e-3 * timeout_ms)));
-    if (!streaming_ || wait_s > 1e-3 * timeout_ms) return false;
-    const image_t& shown = images_[static_cast<std::size_t>(shown_) % images_.size()];
-    *image = {shown.width, shown.height, shown.data};
-    frame->utime = std::llround(1e6 * steady_s());
-    frame->sequence = shown_++;
-    ++counts_.frames;
-    return true;
-  }
-  [[nodiscard]] bool is_streaming() const override { return streaming_; }
-  [[nodiscard]] const drivers::CameraCounts& counts() const override { return counts_; }
-  void on_event(std::function<void(const drivers::CameraEvent&)>) override {}
-  void set_exposure(const drivers::ExposureOptions& options) override { target_grey = options.target_grey; }
-
-  static inline std::atomic<double> target_grey{0.0};
-
- private:
-  std::vector<image_t> images_;
-  double began_s_ = -1.0, away_from_s_ = 1e9, away_to_s_ = 1e9;
-  int shown_ = 0;
-  std::atomic<bool> streaming_{true};
-  drivers::CameraCounts counts_;
-};
-
-class Live : public testing::Test {
- protected:
-  Live() {
-    std::ofstream(scratch_.path("camera.yaml")) << "model: pinhole-radtan\nwidth_px: 480\nheight_px: "
-                                                   "320\nfx_px: 400\nfy_px: 400\ncx_px: 240\ncy_px: 160\n"
-                                                   "distortion: []\nrate_hz: 20\n";
-    config_.camera.calibration = scratch_.path("camera.yaml");
-    config_.camera.rate_hz = kRate_hz;
-    config_.lcm.enabled = false;
-    config_.realtime.lock_memory = false;
-    config_.log.level = "warning";
-    hooks_.on_output = [this](const FrameOutput& f) {
-      if (f.result.state == slam::State::kNoCamera) {
-        silent_.push_back(f);
-      } else {
-        last_seen_ = f;
-        ++frames_;
-      }
-    };
-  }
-
-  // Runs until `enough` says so, then as SIGTERM ends it.
-  int run(const std::function<bool()>& enough) {
-    LiveEnvironment environment;
-    environment.camera = std::move(camera_);
-    const auto on_watch = hooks_.on_watch;
-    hooks_.on_watch = [&, on_watch] {
-      if (on_watch) on_watch();
-      if (stopped_s_ == 0.0 && enough()) {
-        stopped_s_ = steady_s();
-        raise(SIGTERM);
-      }
-    };
-    environment.hooks = hooks_;
-    testing::internal::CaptureStdout();
-    const int status = live(
-        options_, config_, [this] { return reloaded_; }, std::move(environment));
-    stop_took_s_ = steady_s() - stopped_s_;
-    printed_ = testing::internal::GetCapturedStdout();
-    return status;
-  }
-
-  const test::Scratch scratch_;
-  Options options_;
-  Config config_, reloaded_;
-  ThreadHooks hooks_;
-  std::unique_ptr<FilmCamera> camera_ = std::make_unique<FilmCamera>();
-  std::atomic<int> frames_{0};
-  FrameOutput last_seen_;            // output's thread, read after the run
-  std::vector<FrameOutput> silent_;  // the same
-  double stopped_s_ = 0, stop_took_s_ = 0;
-  std::string printed_;
-};
+using Live = LiveRunTest;
 
 TEST_F(Live, StopsInOrderWithinASecond) {
   EXPECT_EQ(run([this] { return frames_ >= 10; }), 0);
@@ -261,7 +160,7 @@ TEST_F(Live, HangupTakesOverWhatMayChange) {
   reloaded_.camera.exposure.target_grey = 77.0;
   reloaded_.lcm.status_rate_hz = 2.0;
   reloaded_.can.interface = "can9";  // may not
-  FilmCamera::target_grey = 0.0;
+  const auto target_grey = camera_->target_grey();
   bool sent = false;
   hooks_.on_watch = [&] {
     manager.read_all();
@@ -270,7 +169,7 @@ TEST_F(Live, HangupTakesOverWhatMayChange) {
     raise(SIGHUP);
   };
   EXPECT_EQ(run([this] { return frames_ >= 15; }), 0);
-  EXPECT_EQ(FilmCamera::target_grey.load(), 77.0);
+  EXPECT_EQ(target_grey->load(), 77.0);
   EXPECT_EQ(manager.count("RELOADING=1"), 1);
   EXPECT_EQ(manager.count("READY=1"), 2);
   EXPECT_EQ(keys_that_need_a_restart(config_, reloaded_), "can.interface");
@@ -278,14 +177,6 @@ TEST_F(Live, HangupTakesOverWhatMayChange) {
 }
 
 TEST_F(Live, WhatIsMissingIsSaidBeforeItStarts) {
-  const auto complaint = [&] {
-    try {
-      (void)live(options_, config_, {}, {});
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
   config_.camera.calibration = "/nonexistent/camera.yaml";
   EXPECT_NE(complaint().find("/nonexistent/camera.yaml: cannot be opened"), std::string::npos) << complaint();
   config_.camera.calibration = scratch_.path("camera.yaml");

@@ -117,7 +117,7 @@ class Bus(unittest.TestCase):
 
 
 class Images(unittest.TestCase):
-    def complaint(self, spoil=lambda events: events, may_miss="0"):
+    def complaint(self, spoil=lambda events: events, may_miss="0", channel="CAMERA_0"):
         frames = [bytes([number]) * checks.FRAME_BYTES for number in range(10)]
         events = []
         for number, pixels in enumerate(frames):
@@ -128,7 +128,7 @@ class Images(unittest.TestCase):
             (folder / "frames.grey").write_bytes(b"".join(frames))
             (folder / "played").write_text("clock 1 2\n" + "".join(f"{i} {i} {7000 + 100 * i}\n" for i in range(10)))
             lcm_log.write(folder / "run.lcm", spoil(events))
-            return checks.images(folder, types.SimpleNamespace(), "run.lcm", "played", "5", may_miss)[0]
+            return checks.images(folder, types.SimpleNamespace(), "run.lcm", "played", "5", may_miss, channel)[0]
 
     def test_good(self):
         self.assertIsNone(self.complaint())
@@ -136,6 +136,12 @@ class Images(unittest.TestCase):
     def test_missing(self):
         self.assertRegex(self.complaint(lambda e: e[:4] + e[5:]), "frame 4 never came; 1 of 10")
         self.assertIsNone(self.complaint(lambda e: e[:4] + e[5:], may_miss="1"))
+
+    def test_other_camera(self):
+        self.assertRegex(self.complaint(channel="CAMERA_1"), "frame 0 never came; 10 of 10")
+        both = lambda e: e[:4] + [("CAMERA_1", data) for _, data in e]  # noqa: E731
+        self.assertIsNone(self.complaint(both, channel="CAMERA_1"))
+        self.assertRegex(self.complaint(both), "frame 4 never came; 6 of 10")
 
     def test_twice_or_in_another_order(self):
         self.assertRegex(self.complaint(lambda e: e[:4] + e[3:]), "image 4 .* has come already")

@@ -60,6 +60,22 @@ TEST(Top, ShowsStateRatesAndHealth) {
   EXPECT_TRUE(has(board.render(102.0, true), "\x1b[1;32mTRACKING"));
 }
 
+TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  board.take(s, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "stereo"));
+  s.stereo_pairs = 912;
+  s.stereo_left_alone = 34;
+  s.stereo_right_alone = 5;
+  board.take(s, 100.2);
+  const std::string text = board.render(100.3, false);
+  EXPECT_TRUE(has(text, "stereo    912 pairs   34 left alone   5 right alone\n")) << text;
+  s.stereo_pairs = s.stereo_right_alone = 0;  // it never came
+  board.take(s, 100.4);
+  EXPECT_TRUE(has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone\n"));
+}
+
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {
   Board board;
   board.take(status_of(status_t::STATE_TRACKING), 100.0);

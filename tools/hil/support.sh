@@ -119,7 +119,13 @@ carry_odometry() {
   cp /tmp/played /tmp/can.log "$left"
 }
 
-loopback() { modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 max_buffers=8 || fail "no v4l2loopback"; }
+# loopback [NUMBERS]: /dev/videoN of each, by default of 10 alone.
+loopback() {
+  local numbers=${1:-10} commas
+  commas=${numbers//[0-9]/}
+  modprobe v4l2loopback devices=$((${#commas} + 1)) video_nr="$numbers" exclusive_caps="0${commas//,/,0}" max_buffers=8 ||
+    fail "no v4l2loopback"
+}
 
 # start_playing FRAMES [LEAVE_OUT]: the simulated sequence at 10 Hz, half its pace; it begins with `go`.
 start_playing() {

@@ -148,6 +148,10 @@ std::string Board::count_lines() const {
       "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
       s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
       s.camera_losses);
+  if (s.stereo_pairs > 0 || s.stereo_left_alone > 0 || s.stereo_right_alone > 0) {
+    text += fmt::format("stereo    {} pairs   {} left alone   {} right alone\n", s.stereo_pairs,
+                        s.stereo_left_alone, s.stereo_right_alone);
+  }
   text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
                       s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
   text += fmt::format("map       {} keyframes   {} landmarks   {} virtual points\n", s.keyframes, s.landmarks,

@@ -35,12 +35,12 @@ def frame_of(image, frames, begin, tolerance_us):
     return None
 
 
-def images(folder, stock, log, of, tolerance_us="0", may_miss="0"):
+def images(folder, stock, log, of, tolerance_us="0", may_miss="0", channel="CAMERA_0"):
     """Every frame that was played came once, in order, byte for byte, and with its time."""
     del stock
     _, frames = played(folder / of)
     pixels = (folder / "frames.grey").read_bytes()
-    came = [image for _, image in lcm_log.images(folder / log)]
+    came = [image for _, image in lcm_log.images(folder / log, channel)]
     worst_us, next_frame, missing = 0, 0, []
     for number, image in enumerate(came):
         at = frame_of(image, frames, next_frame, int(tolerance_us))
