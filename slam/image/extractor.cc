@@ -24,13 +24,22 @@ const SteeredPattern& steered_pattern() {
 }
 
 std::size_t padded(int width) {
-  return static_cast<std::size_t>((width + 2 * kRowAlignment - 1) / kRowAlignment * kRowAlignment);
+  return (static_cast<std::size_t>(width) + 2 * kRowAlignment - 1) / kRowAlignment * kRowAlignment;
 }
 
 // What one level has while a frame is worked on.
 struct Level {
   std::vector<Corner> corners;
   int cell_columns = 0, cell_rows = 0;
+
+  [[nodiscard]] std::size_t cells() const {
+    return static_cast<std::size_t>(cell_columns) * static_cast<std::size_t>(cell_rows);
+  }
+  // Row-major.
+  [[nodiscard]] std::size_t cell_of(const Corner& c, int cell_px) const {
+    return static_cast<std::size_t>(c.y / cell_px) * static_cast<std::size_t>(cell_columns) +
+           static_cast<std::size_t>(c.x / cell_px);
+  }
 };
 
 }  // namespace
@@ -68,11 +77,10 @@ struct Extractor::Workspace {
 
 Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyramid_options,
                                 const ExtractorOptions& extractor_options)
-    : options(extractor_options) {
+    : options(extractor_options), row_stride(padded(width)) {
   options.cell_px = std::max(8, options.cell_px);
   options.fast_threshold_min = std::clamp(options.fast_threshold_min, 1, 255);
   options.fast_threshold = std::clamp(options.fast_threshold, options.fast_threshold_min, 255);
-  row_stride = padded(width);
   const std::size_t count = static_cast<std::size_t>(std::max(1, pyramid_options.levels));
   levels.resize(count);
   available.resize(count);
@@ -83,7 +91,7 @@ Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyr
               h = static_cast<int>(std::lround(height / scale));
     Level& level = levels[l];
     // No two maxima of 3x3 neighbourhoods lie in the same 2x2 block.
-    level.corners.reserve(static_cast<std::size_t>((w / 2 + 1) * (h / 2 + 1)));
+    level.corners.reserve((static_cast<std::size_t>(w) / 2 + 1) * (static_cast<std::size_t>(h) / 2 + 1));
     level.cell_columns = w / options.cell_px + 1;
     level.cell_rows = h / options.cell_px + 1;
     // Between equal density on the level's own pixels (1 / scale^2) and equal numbers.
@@ -91,7 +99,7 @@ Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyr
   }
   scores.assign(3 * row_stride, 0);
   maxima.assign(row_stride, 0);
-  cell_hit.assign(static_cast<std::size_t>(levels[0].cell_columns * levels[0].cell_rows), 0);
+  cell_hit.assign(levels[0].cells(), 0);
   ring.assign(7 * row_stride, 0);
   blurred.assign(row_stride * static_cast<std::size_t>(height), 0);
 }
@@ -139,7 +147,7 @@ void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView
   std::fill(cell_hit.begin(), cell_hit.end(), std::uint8_t{0});
   const int cell = options.cell_px;
   for (const Corner& c : level.corners) {
-    cell_hit[static_cast<std::size_t>((c.y / cell) * level.cell_columns + c.x / cell)] = 1;
+    cell_hit[level.cell_of(c, cell)] = 1;
   }
   if (options.fast_threshold_min == options.fast_threshold) return;
   for (int row = 0; row < level.cell_rows; ++row) {
@@ -167,8 +175,8 @@ void Extractor::Workspace::choose(const Pyramid& pyramid, int most) {
     level.corners.resize(static_cast<std::size_t>(select_spread(level.corners, box, quota[l])));
     const int cell = options.cell_px;
     const auto place = [&](const Corner& c) {
-      const int index = (c.y / cell) * level.cell_columns + c.x / cell;
-      return (static_cast<std::uint64_t>(index) << 32) | (static_cast<std::uint64_t>(c.y) << 16) | c.x;
+      return (static_cast<std::uint64_t>(level.cell_of(c, cell)) << 32) |
+             (static_cast<std::uint64_t>(c.y) << 16) | c.x;
     };
     std::sort(level.corners.begin(), level.corners.end(),
               [&](const Corner& a, const Corner& b) { return place(a) < place(b); });
