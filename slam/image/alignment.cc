@@ -55,6 +55,10 @@ Float4 load4(const float* p) {
   return v;
 }
 
+void store4(Float4 v, float* p) {
+  std::memcpy(p, &v, sizeof(v));
+}
+
 float sum(Float4 v) {
   return (v[0] + v[1]) + (v[2] + v[3]);
 }
@@ -124,19 +128,6 @@ bool sample_window(const Kernels& kernels, const ImageView& image, float x, floa
   return true;
 }
 
-float dot(const float* a, const float* b) {
-  Float4 total = {};
-  for (std::size_t i = 0; i < kCount; i += 4) total += load4(a + i) * load4(b + i);
-  return sum(total);
-}
-
-void subtract_mean(float* w) {
-  Float4 total = {};
-  for (std::size_t i = 0; i < kCount; i += 4) total += load4(w + i);
-  const float mean = sum(total) / kCount;
-  for (std::size_t i = 0; i < kCount; ++i) w[i] -= mean;
-}
-
 // Template made free of brightness: the model is image(p + d) = gain * template(d + shift) + offset, and
 // gradients orthogonal to the template and to a constant see the shift alone.
 struct Normalised {
@@ -146,20 +137,39 @@ struct Normalised {
   Eigen::Matrix2f inverse_hessian;
 };
 
-// Of n->unit, as warped. False where it shows nothing that could be aligned.
+// Of n->unit, as warped. False where it shows nothing that could be aligned. Each pass over the template
+// makes the sums that the next one needs: they are chains of additions, and several go on at once.
 bool normalise(Normalised* n) {
   PatchTemplate& t = n->unit;
-  subtract_mean(t.value);
-  n->norm = std::sqrt(dot(t.value, t.value));
+  Float4 value = {}, dx = {}, dy = {};
+  for (std::size_t i = 0; i < kCount; i += 4)
+    value += load4(t.value + i), dx += load4(t.dx + i), dy += load4(t.dy + i);
+  const float mean = sum(value) / kCount, mean_dx = sum(dx) / kCount, mean_dy = sum(dy) / kCount;
+  Float4 square = {};
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    const Float4 v = load4(t.value + i) - mean;
+    store4(v, t.value + i);
+    square += v * v;
+  }
+  n->norm = std::sqrt(sum(square));
   // Flat: less contrast than the noise.
   if (!(n->norm > kMinNoise * kSide)) return false;
-  for (float& v : t.value) v /= n->norm;
-  for (float* gradient : {t.dx, t.dy}) {
-    subtract_mean(gradient);
-    const float along = dot(gradient, t.value);
-    for (std::size_t i = 0; i < kCount; ++i) gradient[i] -= along * t.value[i];
+  Float4 along_dx = {}, along_dy = {};
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    const Float4 v = load4(t.value + i) / n->norm;
+    const Float4 gx = load4(t.dx + i) - mean_dx, gy = load4(t.dy + i) - mean_dy;
+    store4(v, t.value + i), store4(gx, t.dx + i), store4(gy, t.dy + i);
+    along_dx += gx * v, along_dy += gy * v;
   }
-  const float xx = dot(t.dx, t.dx), xy = dot(t.dx, t.dy), yy = dot(t.dy, t.dy);
+  const float value_in_dx = sum(along_dx), value_in_dy = sum(along_dy);
+  Float4 sum_xx = {}, sum_xy = {}, sum_yy = {};
+  for (std::size_t i = 0; i < kCount; i += 4) {
+    const Float4 v = load4(t.value + i);
+    const Float4 gx = load4(t.dx + i) - value_in_dx * v, gy = load4(t.dy + i) - value_in_dy * v;
+    store4(gx, t.dx + i), store4(gy, t.dy + i);
+    sum_xx += gx * gx, sum_xy += gx * gy, sum_yy += gy * gy;
+  }
+  const float xx = sum(sum_xx), xy = sum(sum_xy), yy = sum(sum_yy);
   const float determinant = xx * yy - xy * xy;
   if (!(determinant > 1e-6F * (xx + yy) * (xx + yy))) return false;
   n->inverse_hessian << yy, -xy, -xy, xx;

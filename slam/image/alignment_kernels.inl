@@ -7,38 +7,47 @@ using VF = hn::Vec<F32>;
 inline constexpr int kLanes = static_cast<int>(hn::MaxLanes(F32()));
 inline constexpr int kParts = kTemplateSide / kLanes;  // vectors a row
 
+// Integers until the last step, so that neither the order nor the direction of the sums matters.
 void smooth_patch(const std::uint8_t* HWY_RESTRICT patch, float* HWY_RESTRICT out) {
   constexpr int kSide = kAlignPatchSide;
-  const hn::CappedTag<std::uint16_t, kTemplateSide> d;
-  const hn::Rebind<std::uint8_t, decltype(d)> d8;
-  const hn::CappedTag<float, kTemplateSide / 2> df;
-  const hn::Rebind<std::uint16_t, decltype(df)> d_half;
-  const hn::Rebind<std::uint32_t, decltype(df)> d32;
-  // Rows with a pixel repeated at both ends, smoothed along x, and one row repeated at top and bottom.
-  alignas(64) std::uint8_t row[kSide + 2 + 6] = {};
-  alignas(64) std::uint16_t rows[kSide + 2][kSide];
-  for (int y = 0; y < kSide; ++y) {
-    std::copy_n(patch + y * kSide, kSide, row + 1);
-    row[0] = row[1];
-    row[kSide + 1] = row[kSide];
-    for (int x = 0; x < kSide; x += static_cast<int>(hn::Lanes(d))) {
-      const auto left = hn::PromoteTo(d, hn::LoadU(d8, row + x)),
-                 right = hn::PromoteTo(d, hn::LoadU(d8, row + x + 2));
-      const auto middle = hn::PromoteTo(d, hn::LoadU(d8, row + x + 1));
-      hn::StoreU(hn::Add(hn::Add(left, right), hn::Add(middle, middle)), d, rows[y + 1] + x);
-    }
-  }
-  std::copy_n(rows[1], kSide, rows[0]);
-  std::copy_n(rows[kSide], kSide, rows[kSide + 1]);
+  const hn::FixedTag<std::uint8_t, kSide> d8;
+  const hn::Half<decltype(d8)> d8_half;
+  const hn::Rebind<std::uint16_t, decltype(d8_half)> d16;
+  const F32 df;
+  const hn::Rebind<std::uint16_t, F32> d16_of_float;
+  const hn::Rebind<std::int32_t, F32> d32;
+  // Each pixel's neighbours along the row; at the ends the pixel itself.
+  alignas(16) static constexpr std::uint8_t kLeft[kSide] = {0, 0, 1, 2,  3,  4,  5,  6,
+                                                            7, 8, 9, 10, 11, 12, 13, 14};
+  alignas(16) static constexpr std::uint8_t kRight[kSide] = {1, 2,  3,  4,  5,  6,  7,  8,
+                                                             9, 10, 11, 12, 13, 14, 15, 15};
+  const auto left = hn::Load(d8, kLeft), right = hn::Load(d8, kRight);
+  using V16 = hn::Vec<decltype(d16)>;
+  struct Row {
+    V16 low, high;
+  };
+  const auto along_row = [&](int y) HWY_ATTR {
+    const auto here = hn::LoadU(d8, patch + y * kSide);
+    const auto before = hn::TableLookupBytes(here, left), behind = hn::TableLookupBytes(here, right);
+    const auto low = [&](auto v) HWY_ATTR { return hn::PromoteTo(d16, hn::LowerHalf(d8_half, v)); };
+    const auto high = [&](auto v) HWY_ATTR { return hn::PromoteTo(d16, hn::UpperHalf(d8_half, v)); };
+    return Row{hn::Add(hn::Add(low(before), low(behind)), hn::Add(low(here), low(here))),
+               hn::Add(hn::Add(high(before), high(behind)), hn::Add(high(here), high(here)))};
+  };
   const auto sixteenth = hn::Set(df, 0.0625F);
+  alignas(64) std::uint16_t sums[kSide];
+  Row above = along_row(0), here = above;
   for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; x += static_cast<int>(hn::Lanes(df))) {
-      const auto above = hn::LoadU(d_half, rows[y] + x), here = hn::LoadU(d_half, rows[y + 1] + x),
-                 below = hn::LoadU(d_half, rows[y + 2] + x);
-      const auto sum = hn::Add(hn::Add(above, below), hn::Add(here, here));
-      const auto wide = hn::BitCast(hn::Rebind<std::int32_t, decltype(df)>(), hn::PromoteTo(d32, sum));
+    const Row below = y + 1 < kSide ? along_row(y + 1) : here;
+    const auto down = [](V16 a, V16 b, V16 c) HWY_ATTR { return hn::Add(hn::Add(a, c), hn::Add(b, b)); };
+    hn::Store(down(above.low, here.low, below.low), d16, sums);
+    hn::Store(down(above.high, here.high, below.high), d16, sums + kSide / 2);
+    for (int x = 0; x < kSide; x += kLanes) {
+      const auto wide = hn::PromoteTo(d32, hn::Load(d16_of_float, sums + x));
       hn::StoreU(hn::Mul(hn::ConvertTo(df, wide), sixteenth), df, out + y * kSide + x);
     }
+    above = here;
+    here = below;
   }
 }
 
