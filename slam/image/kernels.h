@@ -59,6 +59,11 @@ struct Band {
   float angle_rad = 0, max_turn_rad = 0;  // largest difference of angles, 0..pi
 };
 
+// Positions [begin, end) of PointArrays.
+struct PositionRange {
+  std::int32_t begin = 0, end = 0;
+};
+
 // Patch alignment (alignment.cc): side of a patch, and of the template that is warped from it.
 inline constexpr int kAlignPatchSide = 16;
 inline constexpr int kTemplateSide = 8;
@@ -121,8 +126,10 @@ struct Kernels {
   // distances[i] = number of bits in which `query` and the 256 bits at descriptors + 4 * indices[i] differ.
   void (*hamming)(const std::uint64_t query[4], const std::uint64_t* descriptors,
                   const std::uint32_t* indices, int count, std::uint16_t* distances);
-  // Positions of [begin, end) that lie in the band, ascending. Returns how many were written to `out`.
-  int (*select_in_band)(const PointArrays& points, int begin, int end, const Band& band, std::uint32_t* out);
+  // Positions of the ranges that lie in the band, range by range, ascending. Returns how many were written to
+  // `out`.
+  int (*select_in_band)(const PointArrays& points, const PositionRange* ranges, int range_count,
+                        const Band& band, std::uint32_t* out);
 
   // [1 2 1] / 4 along both axes of a 16x16 patch; pixels outside count as their neighbour inside.
   void (*smooth_patch)(const std::uint8_t* patch, float* out);

@@ -135,20 +135,23 @@ void hamming(const std::uint64_t query[4], const std::uint64_t* descriptors, con
   }
 }
 
-int select_in_band(const PointArrays& points, int begin, int end, const Band& band, std::uint32_t* out) {
+bool in_band(const PointArrays& points, int i, const Band& band) {
   constexpr float kTurn = 6.2831853F;
+  const float du = points.u_px[i] - band.u_px, dv = points.v_px[i] - band.v_px;
+  const float along = du * band.along_u + dv * band.along_v;
+  const float across = std::abs(dv * band.along_u - du * band.along_v);
+  const float turn = std::abs(points.angle_rad[i] - band.angle_rad);
+  return across <= band.half_width_px && along >= -band.half_width_px &&
+         along <= band.length_px + band.half_width_px && std::min(turn, kTurn - turn) <= band.max_turn_rad &&
+         points.level[i] >= band.min_level && points.level[i] <= band.max_level;
+}
+
+int select_in_band(const PointArrays& points, const PositionRange* ranges, int range_count, const Band& band,
+                   std::uint32_t* out) {
   int count = 0;
-  for (int i = begin; i < end; ++i) {
-    const float du = points.u_px[i] - band.u_px, dv = points.v_px[i] - band.v_px;
-    const float along = du * band.along_u + dv * band.along_v;
-    const float across = std::abs(dv * band.along_u - du * band.along_v);
-    const float turn = std::abs(points.angle_rad[i] - band.angle_rad);
-    const bool inside = across <= band.half_width_px && along >= -band.half_width_px &&
-                        along <= band.length_px + band.half_width_px;
-    const bool alike = std::min(turn, kTurn - turn) <= band.max_turn_rad &&
-                       points.level[i] >= band.min_level && points.level[i] <= band.max_level;
-    if (inside && alike) out[count++] = static_cast<std::uint32_t>(i);
-  }
+  for (const PositionRange* r = ranges; r != ranges + range_count; ++r)
+    for (int i = r->begin; i < r->end; ++i)
+      if (in_band(points, i, band)) out[count++] = static_cast<std::uint32_t>(i);
   return count;
 }
 

@@ -233,20 +233,30 @@ void compare_pairs(const std::uint8_t* HWY_RESTRICT patch, const std::uint16_t* 
 
 void hamming(const std::uint64_t query[4], const std::uint64_t* HWY_RESTRICT descriptors,
              const std::uint32_t* HWY_RESTRICT indices, int count, std::uint16_t* HWY_RESTRICT distances) {
-  const hn::CappedTag<std::uint64_t, 4> d;
   constexpr int kWords = 4;
+  const auto other = [&](int i) { return descriptors + kWords * static_cast<std::size_t>(indices[i]); };
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+  // One instruction a word, and no sum over the lanes of a vector.
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t* const d = other(i);
+    int sum = 0;
+    for (int w = 0; w < kWords; ++w) sum += __builtin_popcountll(query[w] ^ d[w]);
+    distances[i] = static_cast<std::uint16_t>(sum);
+  }
+#else
+  const hn::CappedTag<std::uint64_t, kWords> d;
   const int step = static_cast<int>(hn::Lanes(d));
   for (int i = 0; i < count; ++i) {
-    const std::uint64_t* other = descriptors + kWords * static_cast<std::size_t>(indices[i]);
     auto sum = hn::Zero(d);
     for (int w = 0; w < kWords; w += step)
-      sum = hn::Add(sum, hn::PopulationCount(hn::Xor(hn::LoadU(d, query + w), hn::LoadU(d, other + w))));
+      sum = hn::Add(sum, hn::PopulationCount(hn::Xor(hn::LoadU(d, query + w), hn::LoadU(d, other(i) + w))));
     distances[i] = static_cast<std::uint16_t>(hn::GetLane(hn::SumOfLanes(d, sum)));
   }
+#endif
 }
 
-int select_in_band(const PointArrays& points, int begin, int end, const Band& band,
-                   std::uint32_t* HWY_RESTRICT out) {
+int select_in_band(const PointArrays& points, const PositionRange* HWY_RESTRICT ranges, int range_count,
+                   const Band& band, std::uint32_t* HWY_RESTRICT out) {
   const hn::CappedTag<float, 16> d;
   const auto u0 = hn::Set(d, band.u_px), v0 = hn::Set(d, band.v_px);
   const auto along_u = hn::Set(d, band.along_u), along_v = hn::Set(d, band.along_v);
@@ -256,22 +266,31 @@ int select_in_band(const PointArrays& points, int begin, int end, const Band& ba
   const auto angle = hn::Set(d, band.angle_rad), max_turn = hn::Set(d, band.max_turn_rad);
   const auto whole_turn = hn::Set(d, 6.2831853F);
   const int step = static_cast<int>(hn::Lanes(d));
-  int count = 0;
-  for (int i = begin; i < end; i += step) {
-    const auto du = hn::Sub(hn::LoadU(d, points.u_px + i), u0),
-               dv = hn::Sub(hn::LoadU(d, points.v_px + i), v0);
+  const float *const u_px = points.u_px, *const v_px = points.v_px, *const angle_rad = points.angle_rad,
+                     *const levels = points.level;
+  const auto in_band = [&](int i) HWY_ATTR {
+    const auto du = hn::Sub(hn::LoadU(d, u_px + i), u0), dv = hn::Sub(hn::LoadU(d, v_px + i), v0);
     const auto along = hn::Add(hn::Mul(du, along_u), hn::Mul(dv, along_v));
     const auto across = hn::Abs(hn::Sub(hn::Mul(dv, along_u), hn::Mul(du, along_v)));
     const auto inside =
         hn::And(hn::Le(across, half_width), hn::And(hn::Ge(along, first), hn::Le(along, last)));
-    const auto turn = hn::Abs(hn::Sub(hn::LoadU(d, points.angle_rad + i), angle));
-    const auto level = hn::LoadU(d, points.level + i);
+    const auto turn = hn::Abs(hn::Sub(hn::LoadU(d, angle_rad + i), angle));
+    const auto level = hn::LoadU(d, levels + i);
     const auto alike = hn::And(hn::Le(hn::Min(turn, hn::Sub(whole_turn, turn)), max_turn),
                                hn::And(hn::Ge(level, min_level), hn::Le(level, max_level)));
     std::uint64_t bits = 0;
     hn::StoreMaskBits(d, hn::And(inside, alike), reinterpret_cast<std::uint8_t*>(&bits));
-    if (end - i < step) bits &= (std::uint64_t{1} << (end - i)) - 1;  // of the last vector, what is inside
-    for (; bits != 0; bits &= bits - 1) out[count++] = static_cast<std::uint32_t>(i + __builtin_ctzll(bits));
+    return bits;
+  };
+  int count = 0;
+  for (const PositionRange* r = ranges; r != ranges + range_count; ++r) {
+    for (int i = r->begin; i < r->end; i += step) {
+      std::uint64_t bits = in_band(i);
+      if (r->end - i < step)
+        bits &= (std::uint64_t{1} << (r->end - i)) - 1;  // of the last vector, what is inside
+      for (; bits != 0; bits &= bits - 1)
+        out[count++] = static_cast<std::uint32_t>(i + __builtin_ctzll(bits));
+    }
   }
   return count;
 }

@@ -9,8 +9,9 @@ namespace farpoint::slam {
 
 namespace {
 
-// Lines of a driving camera run mostly across the image: flat cells keep few rows in their way.
-constexpr int kCellWidth_px = 32, kCellHeight_px = 16;
+// A row of cells that a line passes costs more than points looked at in vain, since a vector takes up to
+// sixteen of those at once: high cells make for few rows. (Of 16, 32, 48 and 64 px on KITTI.)
+constexpr int kCellWidth_px = 32, kCellHeight_px = 48;
 
 int cell_of(float coordinate_px, int cell_px, int cells) {
   return std::clamp(static_cast<int>(coordinate_px) / cell_px, 0, cells - 1);
@@ -20,16 +21,35 @@ struct Interval {
   float low = 0, high = 0;
 };
 
-// Where the band passes between the heights `y`: its extent along u, ends included.
-Interval crossing(const Band& band, Interval y, Interval whole_u) {
-  // |dv * along_u - du * along_v| <= half width, solved for du at both heights.
-  constexpr float kLevelled = 1e-4F;
-  if (std::abs(band.along_v) < kLevelled) return whole_u;
-  const float reach = band.half_width_px / std::abs(band.along_v);
-  const float slope = band.along_u / band.along_v;
-  const float a = band.u_px + (y.low - band.v_px) * slope, b = band.u_px + (y.high - band.v_px) * slope;
-  return {std::max(whole_u.low, std::min(a, b) - reach), std::min(whole_u.high, std::max(a, b) + reach)};
-}
+// Where a band passes: |dv * along_u - du * along_v| <= half width, solved for du. The divisions are made
+// once a band, not once a row of cells.
+class Crossing {
+ public:
+  // whole_u: the extent of the whole band.
+  Crossing(const Band& band, Interval whole_u)
+      : whole_u_(whole_u),
+        u_px_(band.u_px),
+        v_px_(band.v_px),
+        levelled_(std::abs(band.along_v) < kLevelled),
+        reach_px_(band.half_width_px / std::abs(band.along_v)),
+        slope_(band.along_u / band.along_v) {}
+
+  // Between the heights `y`: the band's extent along u, ends included.
+  [[nodiscard]] Interval between(Interval y) const {
+    if (levelled_) return whole_u_;
+    const float a = u_px_ + (y.low - v_px_) * slope_, b = u_px_ + (y.high - v_px_) * slope_;
+    return {std::max(whole_u_.low, std::min(a, b) - reach_px_),
+            std::min(whole_u_.high, std::max(a, b) + reach_px_)};
+  }
+
+ private:
+  static constexpr float kLevelled = 1e-4F;
+
+  Interval whole_u_;
+  float u_px_, v_px_;
+  bool levelled_;
+  float reach_px_, slope_;
+};
 
 }  // namespace
 
@@ -51,6 +71,7 @@ void EpipolarIndex::build(const FeatureSet& set, std::span<const std::uint8_t> w
   const std::size_t count = starts_.back();
   for (std::vector<float>* array : {&u_px_, &v_px_, &angle_rad_, &level_})
     array->resize(count + kRowAlignment);
+  ranges_.resize(static_cast<std::size_t>(rows_) + 1);
   feature_.resize(count);
   found_.resize(count);
   distance_.resize(count);
@@ -68,8 +89,6 @@ void EpipolarIndex::build(const FeatureSet& set, std::span<const std::uint8_t> w
 
 // Positions of all that lies in the band, in found_.
 void EpipolarIndex::collect(const Band& band) {
-  const Kernels& kernels = active_kernels();
-  const PointArrays points{u_px_.data(), v_px_.data(), angle_rad_.data(), level_.data()};
   const float reach = band.half_width_px * (std::abs(band.along_u) + std::abs(band.along_v));
   const float end_u = band.u_px + band.length_px * band.along_u,
               end_v = band.v_px + band.length_px * band.along_v;
@@ -79,18 +98,24 @@ void EpipolarIndex::collect(const Band& band) {
   const auto width = static_cast<float>(width_px_), height = static_cast<float>(height_px_);
   // Written so that NaN fails.
   if (!(u.high >= 0.0F && u.low <= width && v.high >= 0.0F && v.low <= height)) return;
+  const Crossing crossing(band, u);
   const int last_row = cell_of(std::min(v.high, height), kCellHeight_px, rows_);
+  int range_count = 0;
   for (int row = cell_of(std::max(v.low, 0.0F), kCellHeight_px, rows_); row <= last_row; ++row) {
     const auto top = static_cast<float>(row * kCellHeight_px);
-    const Interval x = crossing(band, {std::max(v.low, top), std::min(v.high, top + kCellHeight_px)}, u);
+    const Interval x = crossing.between({std::max(v.low, top), std::min(v.high, top + kCellHeight_px)});
     if (!(x.high >= 0.0F && x.low <= width)) continue;
     const int first_cell = row * columns_ + cell_of(std::max(x.low, 0.0F), kCellWidth_px, columns_);
     const int last_cell = row * columns_ + cell_of(std::min(x.high, width), kCellWidth_px, columns_);
     const auto begin = static_cast<int>(starts_[static_cast<std::size_t>(first_cell)]),
                end = static_cast<int>(starts_[static_cast<std::size_t>(last_cell) + 1]);
-    if (begin < end)
-      found_count_ += kernels.select_in_band(points, begin, end, band, found_.data() + found_count_);
+    // Written in any case and kept where it is not empty: whether it is, no branch predictor can tell.
+    ranges_[static_cast<std::size_t>(range_count)] = {begin, end};
+    range_count += begin < end ? 1 : 0;
   }
+  if (range_count == 0) return;
+  const PointArrays points{u_px_.data(), v_px_.data(), angle_rad_.data(), level_.data()};
+  found_count_ = active_kernels().select_in_band(points, ranges_.data(), range_count, band, found_.data());
 }
 
 EpipolarMatch EpipolarIndex::find(const FeatureSet& set, const EpipolarQuery& q) {

@@ -46,6 +46,7 @@ class EpipolarIndex {
   std::vector<float> u_px_, v_px_, angle_rad_, level_;  // by position
   std::vector<std::uint32_t> feature_;                  // by position: index in the set
   // Work space of find().
+  std::vector<PositionRange> ranges_;  // of the cells that the band passes, row by row
   std::vector<std::uint32_t> found_;
   std::vector<std::uint16_t> distance_;
   int found_count_ = 0;

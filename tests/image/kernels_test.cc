@@ -335,13 +335,16 @@ TEST(Kernels, BandSelectionIsIdenticalAndRight) {
     band.max_level = band.min_level + 3;
     band.angle_rad = uniform(rng, -3.1415F, 3.1415F);
     band.max_turn_rad = 1.0F;
-    const int begin = static_cast<int>(rng() % 50), end = begin + static_cast<int>(rng() % 400);
+    // Ranges apart, adjacent and empty.
+    const int begin = static_cast<int>(rng() % 50), gap = begin + static_cast<int>(rng() % 200);
+    const int gap_end = gap + static_cast<int>(rng() % 3), end = gap_end + static_cast<int>(rng() % 200);
+    const std::array<PositionRange, 3> ranges{{{begin, gap}, {gap, gap}, {gap_end, end}}};
     std::vector<std::uint32_t> expected(kPoints), actual(kPoints);
-    const int count = plain_kernels().select_in_band(points, begin, end, band, expected.data());
+    const int count = plain_kernels().select_in_band(points, ranges.data(), 3, band, expected.data());
     expected.resize(static_cast<std::size_t>(count));
     for_each_target([&](const Kernels& kernels) {
       actual.assign(kPoints, 0);
-      const int n = kernels.select_in_band(points, begin, end, band, actual.data());
+      const int n = kernels.select_in_band(points, ranges.data(), 3, band, actual.data());
       actual.resize(static_cast<std::size_t>(n));
       EXPECT_EQ(actual, expected);
     });
@@ -357,7 +360,8 @@ TEST(Kernels, BandSelectionIsIdenticalAndRight) {
                                      along - double{band.length_px} - double{band.half_width_px},
                                      turn - double{band.max_turn_rad}});
       if (std::abs(worst) < 1e-3) continue;
-      const bool inside = worst < 0 && level[k] >= band.min_level && level[k] <= band.max_level;
+      const bool asked = i < gap || i >= gap_end;
+      const bool inside = asked && worst < 0 && level[k] >= band.min_level && level[k] <= band.max_level;
       EXPECT_EQ(std::count(expected.begin(), expected.end(), static_cast<std::uint32_t>(i)), inside ? 1 : 0);
     }
   }
