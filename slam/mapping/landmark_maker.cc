@@ -318,9 +318,12 @@ bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) c
 
 bool LandmarkMaker::found_elsewhere(const Landmark& l) const {
   const PredictionInput input = prediction_input(map_, l);
-  int asked = 0, found = 0;
+  int asked = 0, found = 0, left = static_cast<int>(witnesses_.size());
   for (const KeyframeHandle witness : witnesses_) {
-    if (asked == kWitnesses) break;
+    // No more are asked when those that are left cannot change the answer, whatever they say.
+    const int more = std::min(left--, kWitnesses - asked);
+    const bool certain = kFoundOneIn * found >= asked + more;
+    if (more == 0 || certain || kFoundOneIn * (found + more) < asked + more) break;
     const Keyframe* k = map_.keyframes().get(witness);
     if (k == nullptr || !k->image || Map::find_observation(l, witness) != nullptr) continue;
     const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(k->camera)].camera;

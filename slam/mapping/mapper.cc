@@ -336,7 +336,8 @@ void Mapper::search_neighbours_landmarks(KeyframeHandle keyframe) {
   std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
   for (const KeyframeHandle& n : neighbours(keyframe, static_cast<std::size_t>(config_.mapping.neighbours)))
     for (const LandmarkHandle& h : map_.keyframes()[n].landmarks)
-      if (map_.landmarks().contains(h) && taken[h.index] == 0) {
+      // What is taken already needs no look at its slot, which lies far away in memory.
+      if (!h.is_null() && taken[h.index] == 0 && map_.landmarks().contains(h)) {
         taken[h.index] = 1;
         theirs.push_back(h);
       }
