@@ -60,8 +60,9 @@ void EpipolarIndex::build(const FeatureSet& set, std::span<const std::uint8_t> w
   columns_ = width_px / kCellWidth_px + 1;
   rows_ = height_px / kCellHeight_px + 1;
   const auto cell = [this](const Feature& f) {
-    return static_cast<std::size_t>(cell_of(f.v_px, kCellHeight_px, rows_) * columns_ +
-                                    cell_of(f.u_px, kCellWidth_px, columns_));
+    const int at =
+        cell_of(f.v_px, kCellHeight_px, rows_) * columns_ + cell_of(f.u_px, kCellWidth_px, columns_);
+    return static_cast<std::size_t>(at);
   };
   // Counting sort: starts_[c + 1] counts, then begins, then ends cell c.
   starts_.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);

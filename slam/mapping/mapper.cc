@@ -5,7 +5,6 @@
 
 #include "slam/map/predict.h"
 #include "slam/mapping/forgetting.h"
-#include "slam/mapping/measurement.h"
 
 namespace farpoint::slam {
 
@@ -74,6 +73,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
       map_(config.capacity, rig, map_options(config)),
       views_(kViews, [&config] { return roomy_view(config); }),
       maker_(config_, &map_, &counts_),
+      anchors_(static_cast<std::size_t>(config.capacity.keyframes)),
       calibrator_(config.calibration, rig.cameras.front().camera),
       sound_run_(kTrustedRun),
       solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
@@ -285,12 +285,13 @@ void Mapper::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle
   const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
   const Predictor predictor(camera, map_.T_world_camera(keyframe).inverse());
   const double scale_factor = config_.pyramid.scale_factor;
+  anchors_.forget();
   for (const LandmarkHandle& lh : landmarks) {
     const Landmark* l = map_.landmarks().get(lh);
     if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr)
       continue;
     Prediction p;
-    if (!predictor.predict(prediction_input(map_, *l), 4.0, &p) || p.view_cosine < 0.5) continue;
+    if (!predictor.predict(anchors_.prediction_input(map_, *l), 4.0, &p) || p.view_cosine < 0.5) continue;
     if (p.scale_change < 0.3F || p.scale_change > 3.3F) continue;
     const int level = predicted_level(l->host_level, p.scale_change, static_cast<float>(scale_factor),
                                       config_.pyramid.levels);
@@ -580,6 +581,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
 
   std::vector<std::uint8_t> taken(map_.landmarks().capacity(), 0);
   std::vector<double> depths;
+  anchors_.forget();
   view->landmarks.reserve(last_view_landmarks_ + last_view_landmarks_ / 4);
   const SE3 T_reference_world = map_.T_world_camera(centre).inverse();
   for (const KeyframeHandle& h : members) {
@@ -593,7 +595,7 @@ std::shared_ptr<const LocalView> Mapper::make_view(KeyframeHandle reference) {
       taken[lh.index] = 1;
       ViewLandmark v;
       v.handle = lh;
-      const PredictionInput in = prediction_input(map_, *l);
+      const PredictionInput in = anchors_.prediction_input(map_, *l);
       v.point_w = in.point_w;
       v.anchor_w = in.anchor_w;
       v.d_point_d_pixel = in.d_point_d_pixel;

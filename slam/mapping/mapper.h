@@ -16,6 +16,7 @@
 #include "slam/mapping/bundle_problem.h"
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/landmark_maker.h"
+#include "slam/mapping/measurement.h"
 #include "slam/mapping/schur_solver.h"
 #include "slam/mapping/soundness.h"
 #include "slam/mapping/statistics.h"
@@ -78,6 +79,7 @@ class Mapper {
   SharedPool<LocalView> views_;
   MappingCounts counts_;
   LandmarkMaker maker_;
+  AnchorMemory anchors_;
   Calibrator calibrator_;
   StageListener* listener_ = nullptr;
 
