@@ -5,15 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "ipc/dbc.h"
+#include "drivers/wheel_signals.h"
 #include "ipc/message.h"
 
 namespace farpoint::drivers {
 
 class WheelReader {
  public:
-  // `names`: "MESSAGE.SIGNAL, ..." one to four, in the order front left, front right, rear left, rear right.
-  // The signals' unit must be m/s or km/h. Throws std::runtime_error saying what was expected.
+  // As read_wheel_signals() takes them. Throws std::runtime_error saying what was expected.
   WheelReader(const std::string& dbc_path, const std::string& names);
 
   // True where the frame completes a measurement: every wheel heard since the last one. A wheel that says
@@ -25,8 +24,7 @@ class WheelReader {
 
  private:
   struct Wheel {
-    ipc::DbcSignal signal;
-    double to_m_s = 1.0;
+    WheelSignal signal;
     double speed_m_s = 0.0;
     bool heard = false;
   };

@@ -95,6 +95,18 @@ unsigned position_of(const DbcSignal& d, unsigned i) {
   return (d.start / 8 + in_row / 8) * 8 + (7 - in_row % 8);
 }
 
+// The numbers that so many bits hold. Of more than 53 a double cannot tell the last ones apart.
+struct RawLimits {
+  double least = 0.0, most = 0.0;
+};
+RawLimits raw_limits(const DbcSignal& d) {
+  constexpr unsigned kExactBits = 53;
+  const unsigned bits = d.is_signed ? d.length - 1 : d.length;
+  const double beyond = std::ldexp(1.0, static_cast<int>(bits));
+  const double most = bits > kExactBits ? std::nextafter(beyond, 0.0) : beyond - 1.0;
+  return {d.is_signed ? -beyond : 0.0, most};
+}
+
 bool fits(const DbcSignal& d) {
   if (d.length == 0 || d.length > 64 || d.start >= 8 * d.size) return false;
   for (unsigned i = 0; i < d.length; ++i)
@@ -121,6 +133,25 @@ double DbcSignal::value(const CanFrame& frame) const {
   const double tolerance = 0.5 * std::abs(factor);
   const bool in_range = min == max || (physical >= min - tolerance && physical <= max + tolerance);
   return in_range ? physical : kNan;
+}
+
+bool DbcSignal::put(double physical, CanFrame* frame) const {
+  if (std::isnan(physical) || factor == 0.0) return false;
+  const double allowed = min < max ? std::clamp(physical, min, max) : physical;
+  const RawLimits limits = raw_limits(*this);
+  const double wanted = std::nearbyint((allowed - offset) / factor);
+  const double number = std::clamp(wanted, limits.least, limits.most);
+  const std::uint64_t raw = is_signed ? static_cast<std::uint64_t>(static_cast<std::int64_t>(number))
+                                      : static_cast<std::uint64_t>(number);
+  frame->id = id;
+  frame->size = static_cast<std::uint8_t>(size);
+  for (unsigned i = 0; i < length; ++i) {
+    const unsigned bit = position_of(*this, i);
+    std::uint8_t& byte = frame->data.at(bit / 8);
+    const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
+    byte = static_cast<std::uint8_t>((raw >> i & 1) != 0 ? byte | mask : byte & ~mask);
+  }
+  return allowed == physical && number == wanted;
 }
 
 DbcSignal read_dbc_signal(const std::string& path, const std::string& message, const std::string& signal) {

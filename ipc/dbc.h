@@ -1,4 +1,5 @@
-// Signals of a DBC file: what is needed to read a value out of a CAN frame by its message's and its own name.
+// Signals of a DBC file: what is needed to read a value out of a CAN frame, or put one into it, by its
+// message's and its own name.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,11 @@ struct DbcSignal {
 
   // The physical value. NaN where the frame is another, too short, or the value outside the range.
   [[nodiscard]] double value(const CanFrame& frame) const;
+
+  // Puts the nearest value that the signal can hold into a frame, which becomes one of its message; the bits
+  // of other signals stay. False where that is another than asked for: beyond the range or the bits, or NaN,
+  // which changes nothing. Precondition: as read_dbc_signal() gives it.
+  [[nodiscard]] bool put(double physical, CanFrame* frame) const;
 };
 
 // Reads one signal's description. Throws std::runtime_error naming the file, the line where there is one, and

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <fstream>
+#include <utility>
+#include <vector>
 
 #include "tests/ipc/scratch.h"
 
@@ -77,6 +80,69 @@ TEST_F(DbcText, WhatIsNoValueIsNaN) {
   EXPECT_TRUE(std::isnan(left.value({290, 8, {}})));            // another frame
   EXPECT_TRUE(std::isnan(left.value({291, 4, {}})));            // cut off
   EXPECT_TRUE(std::isnan(left.value({291, 8, {0xFF, 0xFF}})));  // beyond the range: not available
+}
+
+// Every kind of layout: what is put in comes out, to half a step, and bits beside it stay as they were.
+TEST_F(DbcText, WhatIsPutIntoAFrameIsReadFromIt) {
+  const std::vector<std::pair<const char*, const char*>> names = {
+      {"Wheels", "FrontLeft"}, {"Wheels", "FrontRight"}, {"Wheels", "YawRate"}, {"Long", "Last"}};
+  for (const auto& [message, name] : names) {
+    const DbcSignal signal = read_dbc_signal(path_, message, name);
+    const double least = signal.is_signed ? -200.0 : 0.0;
+    for (double physical = least; physical <= 200.0; physical += 7.77) {
+      CanFrame zeros, ones;
+      ones.data.fill(0xFF);
+      ASSERT_TRUE(signal.put(physical, &zeros)) << name << " " << physical;
+      ASSERT_TRUE(signal.put(physical, &ones)) << name << " " << physical;
+      EXPECT_EQ(zeros.id, signal.id);
+      EXPECT_EQ(zeros.size, signal.size);
+      EXPECT_NEAR(signal.value(zeros), physical, 0.5 * signal.factor + 1e-9) << name;
+      EXPECT_EQ(signal.value(zeros), signal.value(ones)) << name;
+      int own = 0;
+      for (std::size_t i = 0; i < zeros.data.size(); ++i)
+        own += 8 - std::popcount(static_cast<unsigned>(zeros.data[i] ^ ones.data[i]));
+      EXPECT_EQ(own, static_cast<int>(signal.length)) << name << ": other bits were touched";
+    }
+  }
+}
+
+TEST_F(DbcText, SignedMotorolaIsPutAsItIsRead) {
+  // -5 = 0xFFB in twelve bits from byte 4 on.
+  CanFrame frame;
+  ASSERT_TRUE(read_dbc_signal(path_, "Wheels", "YawRate").put(-0.5, &frame));
+  EXPECT_EQ(frame.id, 291U);
+  EXPECT_EQ(frame.data[4], 0xFF);
+  EXPECT_EQ(frame.data[5], 0xB0);
+}
+
+TEST_F(DbcText, WhatDoesNotFitIsPutAtTheLimitAndSaid) {
+  const DbcSignal left = read_dbc_signal(path_, "Wheels", "FrontLeft");  // 0 to 600 in steps of 0.01
+  CanFrame frame;
+  EXPECT_FALSE(left.put(-0.2, &frame));
+  EXPECT_EQ(left.value(frame), 0.0);
+  EXPECT_FALSE(left.put(601.0, &frame));
+  EXPECT_NEAR(left.value(frame), 600.0, 1e-9);
+  const DbcSignal other = read_dbc_signal(path_, "Other", "FrontLeft");  // eight bits, no range, offset -3
+  EXPECT_FALSE(other.put(1000.0, &frame));
+  EXPECT_NEAR(other.value(frame), 124.0, 1e-9);
+  EXPECT_FALSE(other.put(-1000.0, &frame));
+  EXPECT_NEAR(other.value(frame), -131.0, 1e-9);
+  const CanFrame before = frame;
+  EXPECT_FALSE(other.put(std::nan(""), &frame));
+  EXPECT_EQ(frame.data, before.data);
+}
+
+TEST(DbcSignal, SixtyFourBitsHoldTheirLimits) {
+  DbcSignal whole;
+  whole.length = 64;
+  CanFrame frame;
+  EXPECT_FALSE(whole.put(1e30, &frame));
+  EXPECT_NEAR(whole.value(frame), std::ldexp(1.0, 64), std::ldexp(1.0, 12));
+  whole.is_signed = true;
+  EXPECT_FALSE(whole.put(-1e30, &frame));
+  EXPECT_EQ(whole.value(frame), -std::ldexp(1.0, 63));
+  EXPECT_TRUE(whole.put(-5.0, &frame));
+  EXPECT_EQ(whole.value(frame), -5.0);
 }
 
 TEST_F(DbcText, MistakesAreNamed) {
