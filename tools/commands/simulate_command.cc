@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tools/commands/commands.h"
+#include "tools/commands/simulate_stream.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 #include "tools/simulate/recorder.h"
@@ -17,6 +18,8 @@ struct SimulateOptions {
   std::optional<double> duration_s;
   bool stereo = false;
   std::int64_t every = 50;
+  bool streams = false;
+  StreamRequest stream;
 };
 
 void parse_size(const std::string& text, simulate::SimulationRequest* request) {
@@ -49,7 +52,20 @@ simulate::SimulationRequest to_request(const SimulateOptions& options) {
   return request;
 }
 
-int run_simulate(const SimulateOptions& options) {
+int stream_simulation(const SimulateOptions& options) {
+  if (options.format != "grey" || !options.pictures.empty())
+    throw InputError("--format mjpeg and --pictures: expected without --stream");
+  StreamRequest request = options.stream;
+  request.output = options.output;
+  check(request, options.stereo);
+  simulate::Simulation simulation(to_request(options));
+  run_stream(request, &simulation);
+  return kExitDone;
+}
+
+int record_simulation(const SimulateOptions& options) {
+  if (options.output.empty())
+    throw InputError("simulate: expected -o with a log to write, or --stream (see farpoint simulate --help)");
   simulate::RecorderOptions recorder;
   recorder.output = options.output;
   recorder.format = options.format == "mjpeg" ? simulate::ImageFormat::kMjpeg : simulate::ImageFormat::kGrey;
@@ -73,6 +89,49 @@ int run_simulate(const SimulateOptions& options) {
   return kExitDone;
 }
 
+int run_simulate(const SimulateOptions& options) {
+  return options.streams ? stream_simulation(options) : record_simulation(options);
+}
+
+// All of them need --stream.
+void add_stream_options(CLI::App* command, SimulateOptions* options) {
+  CLI::Option* stream = command->add_flag("--stream", options->streams,
+                                          "Send in real time what the sensors say, instead of only a log");
+  StreamRequest& request = options->stream;
+  const std::vector<CLI::Option*> needing = {
+      command
+          ->add_option(
+              "--video", request.video,
+              "Images as GREY into this V4L2 output device (v4l2loopback), each stamped with the time at "
+              "which it was due")
+          ->type_name("DEVICE"),
+      command
+          ->add_option("--second-video", request.second_video, "The same for the second camera of --stereo")
+          ->type_name("DEVICE"),
+      command
+          ->add_option("--lcm-url", request.lcm_url,
+                       "CALIBRATION (each second), IMU, WHEELS and GROUND_TRUTH over the network; without "
+                       "URL: one host")
+          ->type_name("[URL]")
+          ->expected(0, 1),
+      command->add_option("--can", request.can_interface, "Wheel speeds on this SocketCAN interface")
+          ->type_name("IFACE"),
+      command->add_option("--wheels-dbc", request.wheels_dbc, "With --can: DBC file of the vehicle")
+          ->type_name("FILE"),
+      command
+          ->add_option("--wheel-signals", request.wheel_signals,
+                       "With --can: MESSAGE.SIGNAL,... of front left, front right, rear left, rear right; as "
+                       "can.wheel_signals of farpointd")
+          ->type_name("NAMES"),
+      command
+          ->add_option("--pace", request.pace,
+                       "So many times as fast as real time (default 1): slow or fast motion, speeds and turn "
+                       "rates are "
+                       "not changed by it")
+          ->check(CLI::Range(0.01, 100.0))};
+  for (CLI::Option* option : needing) option->needs(stream);
+}
+
 }  // namespace
 
 void add_simulate_command(CLI::App* app, Action* action) {
@@ -83,10 +142,10 @@ void add_simulate_command(CLI::App* app, Action* action) {
       ->add_option("WORLD", options->world,
                    "A world file, or the name of one in config/worlds: town, highway, ...")
       ->required();
-  command
-      ->add_option("-o,--output", options->output,
-                   "LCM log to write; an existing one is replaced; '-' is standard output")
-      ->required();
+  command->add_option(
+      "-o,--output", options->output,
+      "LCM log to write; an existing one is replaced; '-' is standard output. With --stream it may be "
+      "left out, and holds what was streamed, with the times of the stream");
   command
       ->add_option("--seed", options->seed,
                    "Another seed is another world of the same kind (default: the file's)")
@@ -103,16 +162,28 @@ void add_simulate_command(CLI::App* app, Action* action) {
   command->add_option("--pictures", options->pictures, "Folder for some images as PNG files");
   command->add_option("--every", options->every, "With --pictures: every so many frames (default 50)")
       ->check(CLI::Range(1, 1000000));
+  add_stream_options(command, options.get());
   command->footer(
       "The log holds CALIBRATION, SIMULATION (what made it), IMU, WHEELS, GROUND_TRUTH and CAMERA_N. The "
       "same seed "
       "gives\n"
       "the same bytes. A run that ends early leaves what it has as OUTPUT.incomplete, which replays.\n"
+      "--stream: stamps of images and utime of messages are of CLOCK_MONOTONIC, as farpointd's are, so that "
+      "truth can "
+      "be\n"
+      "compared with what it publishes live. Images are rendered ahead; what goes out more than 2 ms after "
+      "its time "
+      "is\n"
+      "counted as late, and the last line says how much of the pace was reached. Ctrl-C and SIGTERM end it "
+      "in order.\n"
       "Examples:\n"
       "  farpoint simulate town -o town.lcm --duration 60\n"
       "  farpoint simulate endless -o - --duration 2000 --size 320x240 | farpointd --replay - --lockstep "
       "--output out.lcm\n"
-      "  farpoint simulate my_world.yaml -o run.lcm --seed 3 --stereo --pictures . --every 100");
+      "  farpoint simulate my_world.yaml -o run.lcm --seed 3 --stereo --pictures . --every 100\n"
+      "  farpoint simulate town --stream --video /dev/video10 --lcm-url --can vcan0 --wheels-dbc car.dbc \\\n"
+      "      --wheel-signals FRONT.LEFT,FRONT.RIGHT,REAR.LEFT,REAR.RIGHT       (modprobe v4l2loopback "
+      "video_nr=10)");
   command->callback([=] { *action = [=] { return run_simulate(*options); }; });
 }
 

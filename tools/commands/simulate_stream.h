@@ -1,0 +1,26 @@
+// `farpoint simulate --stream`: from its options to open devices, and back to a line that says how it went.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "tools/simulate/simulation.h"
+
+namespace farpoint::tools {
+
+struct StreamRequest {
+  std::string video, second_video;        // devices; empty: none
+  std::optional<std::string> lcm_url;     // empty: the default one
+  std::string can_interface;              // empty: none
+  std::string wheels_dbc, wheel_signals;  // as can.wheels_dbc and can.wheel_signals of the daemon
+  double pace = 1.0;
+  std::string output;  // log of what was streamed; empty: none
+};
+
+// Throws InputError where the options do not go together.
+void check(const StreamRequest& request, bool stereo);
+
+// Streams to the end or a signal, and prints the line. Throws what devices complain of.
+void run_stream(const StreamRequest& request, simulate::Simulation* simulation);
+
+}  // namespace farpoint::tools
