@@ -30,8 +30,10 @@ std::string name_of(std::uint32_t code) {
 }  // namespace
 
 V4l2Output::V4l2Output(std::string device, const OutputFormat& format, std::unique_ptr<V4l2System> system)
-    : device_(std::move(device)), format_(format), system_(std::move(system)) {
-  fd_ = system_->open(device_.c_str());
+    : device_(std::move(device)),
+      format_(format),
+      system_(std::move(system)),
+      fd_(system_->open(device_.c_str())) {
   if (fd_ < 0) fail("cannot be opened", fd_);
   try {
     set_up();
