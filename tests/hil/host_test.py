@@ -156,6 +156,53 @@ class Images(unittest.TestCase):
         self.assertRegex(self.complaint(late), "image 4 of time 7430 is of no frame")
 
 
+class Wired(unittest.TestCase):
+    """Forty frames, forwards and backwards; the first twenty are images, 150 ms after they were sent."""
+
+    def complaint(self, order=range(20), late=lambda number: 0, least="10", most_off="2", pixel=None):
+        pixels = [bytes([index]) * checks.FRAME_BYTES for index in range(21)]
+        indices = [*range(21), *range(19, 0, -1)]
+        events = []
+        for number, at in enumerate(order):
+            utime = 1_000_000 + PERIOD_US * number + late(number)
+            data = pixels[indices[at]] if number != pixel else pixels[indices[at]][:-1] + b"\xff"
+            head = lcm_log.IMAGE.pack(utime, number, 0, -1, -1.0, 320, 240, 320, 0, len(data))
+            events.append(("CAMERA_0", bytes(8) + head + data))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "frames.grey").write_bytes(b"".join(pixels))
+            sent = "".join(f"{at} {i} {850_000 + PERIOD_US * at}\n" for at, i in enumerate(indices))
+            (folder / "played").write_text("clock 1 2\n" + sent)
+            lcm_log.write(folder / "run.lcm", events)
+            return checks.wired(folder, types.SimpleNamespace(), "run.lcm", "played", str(PERIOD_US), least, most_off)
+
+    def test_good(self):
+        text = "20 images, each a frame, in order, byte for byte, 150 to 150 ms after it was sent; 0 twice and 0 never"
+        self.assertEqual(self.complaint(), (None, [text]))
+
+    def test_other_bytes(self):
+        self.assertEqual(self.complaint(pixel=7)[0], "image 7 is none of the frames")
+
+    def test_twice_and_never(self):
+        off = [0, 1, 1, 3, *range(4, 20)]
+        self.assertRegex(self.complaint(off)[1][0], "1 twice and 1 never$")
+        self.assertRegex(self.complaint(off, most_off="1")[0], "^1 twice and 1 never of 20 frames, expected at most 1")
+        gap = self.complaint([*range(5), *range(7, 20)], late=lambda number: 200_000)
+        self.assertRegex(gap[0], "^image 5 is frame 7, the one before was frame 4")
+
+    def test_another_order(self):
+        self.assertRegex(self.complaint([0, 1, 2, 4, 3, *range(5, 20)])[0], "^image 4 is frame 3, after frame 4")
+
+    def test_time(self):
+        self.assertRegex(self.complaint(late=lambda number: -200_000)[0], "^image 0 .* which was not sent just before")
+        self.assertRegex(self.complaint(late=lambda number: 600_000)[0], "^image 0 .* which was not sent just before")
+        self.assertRegex(self.complaint(late=lambda number: 60_000 * (number > 5))[0], "^image 6 came 160.0 ms after")
+
+    def test_too_few(self):
+        self.assertEqual(self.complaint(least="21")[0], "20 images, expected 21")
+        self.assertEqual(self.complaint([])[0], "0 images, expected 10")
+
+
 class Bars(unittest.TestCase):
     def complaint(self, spoil=lambda events: events, least="5", size="318x240"):
         row = bytes(round(checks.BARS[8 * x // 318]) for x in range(318))

@@ -1,10 +1,11 @@
 #!/bin/bash
 # Runs in the guest: the scenarios that share this machine, one after the other, each cleaned up after. What a scenario
-# leaves is in /hil/NAME: out, status, seconds, and what it puts there.
+# leaves is in /hil/NAME: out, status, seconds, and what it puts there. One that boots the machine again begins anew.
 export root=/hil
 mountpoint -q /tmp || mount -t tmpfs tmpfs /tmp
 for name in $(cat $root/names); do
   export left=$root/$name
+  [ ! -e "$left/status" ] || continue
   from=$(cut -d' ' -f1 /proc/uptime)
   setsid bash "$left/scenario" > "$left/out" 2>&1 < /dev/null &
   session=$!

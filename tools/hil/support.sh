@@ -174,13 +174,28 @@ service_tracks() {
     [ "${BASH_REMATCH[1]}" -ge 5 ]
 }
 
-# The package, the configuration for the guest, a loopback camera, and LCM's route; nothing is started.
-install_service() {
+# journal_time PID PATTERN: when that process first said so, in s since the kernel's start.
+journal_time() {
+  journalctl -u farpointd _PID="$1" -o short-monotonic --no-pager |
+    sed -n "/$2/{s/^\[ *\([0-9.]*\)\].*/\1/p;q}"
+}
+first_pose_is_out() { [ -n "$(journal_time "$1" "initialising -> ")" ]; }
+# difference LATER EARLIER: in s.
+difference() { echo "$1 $2" | awk '{printf "%.2f", $1 - $2}'; }
+
+# install_package DEVICE: the package, and the configuration for the guest and that camera.
+install_package() {
   dpkg -i "$root/farpoint.deb" > /tmp/dpkg.log 2>&1 || { cat /tmp/dpkg.log; fail "dpkg -i: $(tail -1 /tmp/dpkg.log)"; }
-  write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control /dev/video10 /etc/farpoint/camera.yaml
+  write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control "$1" /etc/farpoint/camera.yaml
   install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
+}
+has_lcm_route() { ip route | grep -q 224.0.0.0/4; }
+
+# The package, a loopback camera, and LCM's route; nothing is started.
+install_service() {
+  install_package /dev/video10
   systemctl start systemd-networkd
-  wait_until 20 "LCM's route" sh -c 'ip route | grep -q 224.0.0.0/4'
+  wait_until 20 "LCM's route" has_lcm_route
   loopback
   udevadm settle
 }

@@ -8,6 +8,7 @@ from host import can_bus, lcm_log
 from host.material import NotMade, run as run_program
 
 FRAME_BYTES = 320 * 240
+OUTPUT_BUFFERS = 4  # of tools/hil/programs/play.c
 NOT_COMPARED = ("FARPOINT_TIMING",)  # measured times
 # What is said about an image, and does not tell how the run was configured.
 OF_IMAGES = ("FARPOINT_ODOMETRY", "FARPOINT_POSE", "FARPOINT_MAP_FROM_ODOM", "FARPOINT_MAP", "FARPOINT_TRAJECTORY",
@@ -57,6 +58,46 @@ def images(folder, stock, log, of, tolerance_us="0", may_miss="0", channel="CAME
         return f"frame {missing[0]} never came; {len(missing)} of {len(frames)} did not", []
     return None, [f"{len(came)} of {len(frames)} frames, each once, in order, byte for byte, "
                   f"time off by at most {1e-3 * worst_us:.1f} ms"]
+
+
+def wired(folder, stock, log, of, period_us, least, most_off):
+    """Every image is a frame that was played, in order, byte for byte, taken after it was sent and before it can have
+    gone: the output's buffers and two periods later. They are a period apart, give or take half of one. The clocks of
+    output and input are two: at most so many frames come twice or never, and no two never one after the other."""
+    del stock
+    _, frames = played(folder / of)
+    pixels = (folder / "frames.grey").read_bytes()
+    places = {}
+    for at, (index, _) in enumerate(frames):
+        places.setdefault(pixels[index * FRAME_BYTES:(index + 1) * FRAME_BYTES], []).append(at)
+    period_us, last, before_us, off, late_us = int(period_us), None, None, [0, 0], []
+    came = [image for _, image in lcm_log.images(folder / log)]
+    for number, image in enumerate(came):
+        same = places.get(image.pixels, [])
+        if not same:
+            return f"image {number} is none of the frames", []
+        in_time = [at for at in same if 0 <= image.utime - frames[at][1] <= (OUTPUT_BUFFERS + 2) * period_us]
+        if not in_time:
+            return f"image {number} of time {image.utime} is frame {same[0]}, which was not sent just before", []
+        following = [at for at in in_time if last is None or at >= last]
+        if not following:
+            return f"image {number} is frame {in_time[0]}, after frame {last}", []
+        if before_us is not None and abs(image.utime - before_us - period_us) > period_us / 2:
+            return f"image {number} came {1e-3 * (image.utime - before_us):.1f} ms after the one before", []
+        if last is not None:
+            if following[0] > last + 2:
+                return f"image {number} is frame {following[0]}, the one before was frame {last}", []
+            off[0] += following[0] == last
+            off[1] += max(0, following[0] - last - 1)
+        last, before_us = following[0], image.utime
+        late_us.append(image.utime - frames[last][1])
+    if len(came) < int(least):
+        return f"{len(came)} images, expected {least}", []
+    text = f"{off[0]} twice and {off[1]} never"
+    if sum(off) > int(most_off):
+        return f"{text} of {len(came)} frames, expected at most {most_off}", []
+    return None, [f"{len(came)} images, each a frame, in order, byte for byte, {1e-3 * min(late_us):.0f} to "
+                  f"{1e-3 * max(late_us):.0f} ms after it was sent; {text}"]
 
 
 # The luma of the eight colour bars at 75 %: white, yellow, cyan, green, magenta, red, blue, black.
@@ -264,7 +305,7 @@ def quiet(folder, stock, prefix, least, *threads):
 
 
 CHECKS = {"images": images, "bars": bars, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
-          "wheels": wheels, "quiet": quiet}
+          "wheels": wheels, "quiet": quiet, "wired": wired}
 
 
 def run(check, folder, stock):

@@ -26,10 +26,11 @@ def guest(here, packages):
 
 def command(guest_folder, kind, devices, folder):
     kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
-    kernel_line += SYSTEMD if kind == "systemd" else ""
+    kernel_line += SYSTEMD if kind in ("systemd", "reboots") else ""
+    end = [] if kind == "reboots" else ["-no-reboot"]
     return [QEMU, "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
             "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
-            "-serial", "stdio", "-monitor", "none", "-no-reboot",
+            "-serial", "stdio", "-monitor", "none", *end,
             "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,
             "-drive", f"file={guest_folder / 'root.ext4'},format=raw,if=virtio,snapshot=on",
             "-virtfs", f"local,path={folder},mount_tag=share,security_model=none,multidevs=remap",

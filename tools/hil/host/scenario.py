@@ -2,7 +2,8 @@
 
     # What is proved, in one line.
     #@ form: short                    or long
-    #@ machine: systemd               else in a machine without it
+    #@ machine: systemd               else in a machine without it; reboots: with it, and the scenario may boot it
+                                      again, with its disk as it is, and begins anew
     #@ devices: -device ...           further devices of the machine
     #@ seconds: what it takes, where that is more than a usual scenario does
     #@ needs: package                 the .deb is laid beside it; libcamera: the module that farpointd loads

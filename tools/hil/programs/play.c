@@ -1,10 +1,10 @@
 // usage: play DEVICE WIDTHxHEIGHT RATE COUNT GO_FILE FRAMES_FILE [LEAVE_OUT]
 //
 // Plays raw grey frames to a video output device, RATE a second, each with the time at which it was due as
-// its stamp. Streams at once, but sends the first frame only when GO_FILE exists, and falls silent while it
-// is away. The file is played forwards and backwards in turn, so that the motion has no jump. Prints "clock
-// MONOTONIC_US REALTIME_US", then "NUMBER INDEX_IN_FILE STAMP_US" a frame. The frame LEAVE_OUT is printed and
-// not sent.
+// its stamp; with RATE 0 at the pace at which the device takes them, with the time at which it could. Streams
+// at once, but sends the first frame only when GO_FILE exists, and falls silent while it is away. The file is
+// played forwards and backwards in turn, so that the motion has no jump. Prints "clock MONOTONIC_US
+// REALTIME_US", then "NUMBER INDEX_IN_FILE STAMP_US" a frame. The frame LEAVE_OUT is printed and not sent.
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -98,10 +98,14 @@ static void map_buffers(int fd, uint8_t* buffers[kBuffers]) {
 }
 
 // Every buffer is sent once before any is taken back.
+static void take_back(int fd, long sent) {
+  struct v4l2_buffer buffer = {.type = V4L2_BUF_TYPE_VIDEO_OUTPUT, .memory = V4L2_MEMORY_MMAP};
+  if (sent >= kBuffers) ask(fd, VIDIOC_DQBUF, &buffer, "VIDIOC_DQBUF");
+}
+
 static void send(int fd, uint8_t* buffers[kBuffers], long sent, const uint8_t* frame, uint32_t bytes,
                  int64_t stamp_us) {
   struct v4l2_buffer buffer = {.type = V4L2_BUF_TYPE_VIDEO_OUTPUT, .memory = V4L2_MEMORY_MMAP};
-  if (sent >= kBuffers) ask(fd, VIDIOC_DQBUF, &buffer, "VIDIOC_DQBUF");
   buffer.index = (uint32_t)(sent % kBuffers);
   memcpy(buffers[buffer.index], frame, bytes);
   buffer.bytesused = bytes;
@@ -118,7 +122,8 @@ int main(int argc, char** argv) {
     fprintf(stderr, "usage: play DEVICE WIDTHxHEIGHT RATE COUNT GO_FILE FRAMES_FILE [LEAVE_OUT]\n");
     return 2;
   }
-  const int64_t period_us = (int64_t)(1e6 / atof(argv[3]));
+  const double rate = atof(argv[3]);
+  const int64_t period_us = rate > 0.0 ? (int64_t)(1e6 / rate) : 0;
   const long count = atol(argv[4]), left_out = argc > 7 ? atol(argv[7]) : -1;
   const uint32_t bytes = width * height;
   const struct frames frames = map_frames(argv[6], bytes);
@@ -138,7 +143,11 @@ int main(int argc, char** argv) {
     const long index = forwards_and_backwards(number, frames.count);
     sleep_until(due_us);
     if (wait_for(argv[5])) due_us = now_us(CLOCK_MONOTONIC);
-    if (number != left_out) send(fd, buffers, sent++, frames.bytes + (size_t)index * bytes, bytes, due_us);
+    if (number != left_out) {
+      take_back(fd, sent);
+      if (period_us == 0) due_us = now_us(CLOCK_MONOTONIC);
+      send(fd, buffers, sent++, frames.bytes + (size_t)index * bytes, bytes, due_us);
+    }
     printf("%ld %ld %lld\n", number, index, (long long)due_us);
     fflush(stdout);
   }

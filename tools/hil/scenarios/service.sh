@@ -4,13 +4,6 @@
 #@ needs: package
 #@ broken: the tracker does not hang
 #@ broken_says: ^restart of a hung tracker: not within
-# journal_time PID PATTERN: when that process first said so, in s.
-journal_time() {
-  journalctl -u farpointd _PID="$1" -o short-monotonic --no-pager |
-    sed -n "/$2/{s/^\[ *\([0-9.]*\)\].*/\1/p;q}"
-}
-first_pose_is_out() { [ -n "$(journal_time "$1" "initialising -> ")" ]; }
-
 install_service
 start_service
 pid=$(main_pid)
@@ -35,7 +28,7 @@ figure "ready $(since "$from") s after kill -9"
 pid=$(main_pid)
 wait_until 30 "the first pose after kill -9" first_pose_is_out "$pid"
 first_s=$(journal_time "$pid" "streams GREY") pose_s=$(journal_time "$pid" "initialising -> ")
-took_s=$(echo "$pose_s $first_s" | awk '{printf "%.2f", $1 - $2}')
+took_s=$(difference "$pose_s" "$first_s")
 at_most "$took_s" 3 || fail "the first pose came $took_s s after the camera's stream, expected at most 3"
 figure "first pose $took_s s after the stream"
 
