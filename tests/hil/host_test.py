@@ -203,6 +203,55 @@ class Wired(unittest.TestCase):
         self.assertEqual(self.complaint([])[0], "0 images, expected 10")
 
 
+class Streamed(unittest.TestCase):
+    """Ten frames at 20 Hz and as many wheel speeds, streamed at half the pace from 5 s on."""
+
+    def complaint(self, late=lambda number: 0, pixel=None, missing=None, speed=0.0, wheels_late_us=0):
+        made, came, turned = [], [], []
+        for number in range(10):
+            utime = 50_000 * number
+            due = 5_000_000 + 2 * utime
+            for events, time, last in ((made, utime, 0), (came, due + late(number), number == pixel)):
+                pixels = bytes([number]) * (checks.FRAME_BYTES - 1) + bytes([last])
+                head = lcm_log.IMAGE.pack(time, number, 0, -1, -1.0, 320, 240, 320, 0, len(pixels))
+                events.append(("CAMERA_0", bytes(8) + head + pixels))
+            turn = (made, utime, 4 * [1.0]), (turned, due + wheels_late_us, [1.0, 1.0, 1.0, 1.0 + speed])
+            for events, time, speeds in turn:
+                head = lcm_log.WHEELS.pack(time, 1.0, -1.0, 0.0, 0.0, 4)
+                events.append(("WHEELS", bytes(8) + head + struct.pack(">4d", *speeds)))
+        if missing is not None:
+            del came[missing]
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "said").write_text("yard: frame 0 at 5000000 us of CLOCK_MONOTONIC, 10 frames a second\n")
+            for file, events in (("made.lcm", made), ("run.lcm", came), ("out.lcm", turned)):
+                lcm_log.write(folder / file, events)
+            (folder / "bin").mkdir()
+            program = folder / "bin/farpoint"
+            program.write_text(f'#!/bin/sh\nfor last; do :; done\ncp {folder}/made.lcm "$last"\n')
+            program.chmod(0o755)
+            stock = types.SimpleNamespace(build=folder)
+            return checks.streamed(folder, stock, "run.lcm", "out.lcm", "said", "320x240", "0.5")[0]
+
+    def test_good(self):
+        self.assertIsNone(self.complaint(wheels_late_us=9_000, speed=0.0013))
+
+    def test_other_bytes(self):
+        self.assertEqual(self.complaint(pixel=4), "image 4 is not frame 4 of the simulation")
+
+    def test_missing(self):
+        self.assertEqual(self.complaint(missing=6), "image 6 is not frame 6 of the simulation")
+        self.assertEqual(self.complaint(missing=9), "9 images and 10 wheel speeds came, expected 10 and 10")
+
+    def test_time(self):
+        late = self.complaint(late=lambda number: 2 * (number == 3))
+        self.assertRegex(late, "^image 3 has time 5300002, was due at 5300000")
+        self.assertRegex(self.complaint(wheels_late_us=11_000), "^wheels: time off by 11.0 ms")
+
+    def test_other_speed(self):
+        self.assertRegex(self.complaint(speed=0.0015), "^wheels 0: ")
+
+
 class Bars(unittest.TestCase):
     def complaint(self, spoil=lambda events: events, least="5", size="318x240"):
         row = bytes(round(checks.BARS[8 * x // 318]) for x in range(318))

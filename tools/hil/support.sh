@@ -135,6 +135,19 @@ start_playing() {
 }
 go() { touch /tmp/go; }
 
+# vehicle_dbc [FACTOR]: a vehicle's wheel speeds in two messages, one in each byte order; FACTOR is of the first signal.
+vehicle_dbc() {
+  cat > /tmp/vehicle.dbc <<DBC
+BO_ 291 FRONT_AXLE: 8 ABS
+ SG_ LEFT : 7|16@0- (${1:-0.01},0) [-300|300] "km/h" FARPOINT
+ SG_ RIGHT : 23|16@0- (0.01,0) [-300|300] "km/h" FARPOINT
+BO_ 292 REAR_AXLE: 8 ABS
+ SG_ LEFT : 0|16@1- (0.01,0) [-300|300] "km/h" FARPOINT
+ SG_ RIGHT : 16|16@1- (0.01,0) [-300|300] "km/h" FARPOINT
+DBC
+}
+wheel_signals=FRONT_AXLE.LEFT,FRONT_AXLE.RIGHT,REAR_AXLE.LEFT,REAR_AXLE.RIGHT
+
 # A USB camera that plays the same frames, at 10 Hz.
 plug_in() {
   /tmp/usb_camera 320x240 10 /tmp/frames.grey >> /tmp/played &

@@ -243,6 +243,46 @@ def wheels(folder, stock, log, bus_log, count):
                   f"time off by at most {1e3 * worst_s:.1f} ms"]
 
 
+# Half of what a bit of the wheel signals of support.sh's DBC stands for, and what rounding may add.
+WHEEL_M_S = 0.5 * 0.01 / 3.6 + 1e-9
+
+
+def streamed(folder, stock, log, output, said, size, seconds):
+    """Every image of the simulation came once, in order, byte for byte, with the time at which it was due; so did its
+    wheel speeds, as fine as their signals are, within 10 ms."""
+    start = re.search(r"frame 0 at (\d+) us of CLOCK_MONOTONIC, ([\d.]+) frames a second", (folder / said).read_text())
+    if start is None:
+        return "the simulator did not say when it began", []
+    run_program(stock.build / "bin/farpoint", "simulate", "yard", "--size", size, "--duration", seconds,
+                "-o", folder / "simulated.lcm")
+    must = [image for _, image in lcm_log.images(folder / "simulated.lcm")]
+    period_us = (must[-1].utime - must[0].utime) / (len(must) - 1)
+    slower = 1e6 / float(start[2]) / period_us
+
+    def due_us(utime):
+        return int(start[1]) + slower * utime
+
+    came = [image for _, image in lcm_log.images(folder / log)]
+    for number, (image, frame) in enumerate(zip(came, must)):
+        if image.pixels != frame.pixels:
+            return f"image {number} is not frame {number} of the simulation", []
+        if abs(image.utime - due_us(frame.utime)) > 1:
+            return f"image {number} has time {image.utime}, was due at {due_us(frame.utime):.0f}", []
+    must_turn, turned = (list(lcm_log.wheels(folder / name)) for name in ("simulated.lcm", output))
+    if (len(came), len(turned)) != (len(must), len(must_turn)):
+        return (f"{len(came)} images and {len(turned)} wheel speeds came, "
+                f"expected {len(must)} and {len(must_turn)}"), []
+    worst_us = 0.0
+    for number, ((utime, _, speeds), (must_utime, _, must_speeds)) in enumerate(zip(turned, must_turn)):
+        if any(abs(is_m_s - must_m_s) > WHEEL_M_S for is_m_s, must_m_s in zip(speeds, must_speeds)):
+            return f"wheels {number}: {speeds}, expected {must_speeds}", []
+        worst_us = max(worst_us, abs(utime - due_us(must_utime)))
+    if worst_us > 10_000:
+        return f"wheels: time off by {1e-3 * worst_us:.1f} ms, expected at most 10", []
+    return None, [f"{len(came)} images and {len(turned)} wheel speeds, each once, in order, as simulated; images byte for "
+                  f"byte with the time at which they were due, wheels off by at most {1e-3 * worst_us:.1f} ms"]
+
+
 # Of x86-64, as far as they are seen.
 SYSTEM_CALLS = {0: "read", 1: "write", 3: "close", 7: "poll", 11: "munmap", 16: "ioctl", 35: "nanosleep", 44: "sendto",
                 46: "sendmsg", 47: "recvmsg", 98: "getrusage", 202: "futex", 228: "clock_gettime",
@@ -305,7 +345,7 @@ def quiet(folder, stock, prefix, least, *threads):
 
 
 CHECKS = {"images": images, "bars": bars, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
-          "wheels": wheels, "quiet": quiet, "wired": wired}
+          "wheels": wheels, "quiet": quiet, "wired": wired, "streamed": streamed}
 
 
 def run(check, folder, stock):

@@ -61,6 +61,7 @@ class Stock:
                 if FIRST <= number < FIRST + FRAMES:
                     frames.write(image.pixels)
         log.unlink()
+        shutil.copy(self.here.parents[1] / "config/worlds/yard.yaml", self.folder)
 
     def packages(self):
         """The run-time libraries of what is tested, as Debian's packages."""

@@ -6,16 +6,7 @@
 #@ broken_says: ^wheels 0: .* m/s, expected
 loopback
 modprobe -a vcan can-raw && ip link add vcan0 type vcan && ip link set up vcan0 || fail "no vcan"
-factor=0.01
-[ -z "$BROKEN" ] || factor=0.02
-cat > /tmp/vehicle.dbc <<DBC
-BO_ 291 FRONT_AXLE: 8 ABS
- SG_ LEFT : 7|16@0- ($factor,0) [-300|300] "km/h" FARPOINT
- SG_ RIGHT : 23|16@0- (0.01,0) [-300|300] "km/h" FARPOINT
-BO_ 292 REAR_AXLE: 8 ABS
- SG_ LEFT : 0|16@1- (0.01,0) [-300|300] "km/h" FARPOINT
- SG_ RIGHT : 16|16@1- (0.01,0) [-300|300] "km/h" FARPOINT
-DBC
+vehicle_dbc ${BROKEN:+0.02}
 # Every 50 ms both axles, from backwards to forwards, and a frame that nobody asked for.
 for n in {0..79}; do
   speed=$((60 * n - 1500))
@@ -27,8 +18,7 @@ for n in {0..79}; do
 done > /tmp/vehicle.log
 start_playing 100
 start_daemon --output /tmp/out.lcm --set can.enabled=true --set can.interface=vcan0 \
-  --set can.wheels_dbc=/tmp/vehicle.dbc \
-  --set can.wheel_signals=FRONT_AXLE.LEFT,FRONT_AXLE.RIGHT,REAR_AXLE.LEFT,REAR_AXLE.RIGHT
+  --set can.wheels_dbc=/tmp/vehicle.dbc --set can.wheel_signals=$wheel_signals
 wait_until 20 "the stream" says "streams GREY"
 go
 candump -L vcan0,120:7F8 > /tmp/wheels.log &
