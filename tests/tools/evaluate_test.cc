@@ -134,6 +134,7 @@ void write_run_log(const fs::path& file, const MadeRun& run) {
     if (!run.tracking_timed)
       std::swap(timing.cpu_ms[timing_t::STAGE_TRACKING], timing.cpu_ms[timing_t::STAGE_FRAME]);
     timing.deadline_missed = i == 5 ? 1 : 0;
+    timing.latency_ms = 7.0 + static_cast<double>(i);
     timing.peak_resident_bytes = 1'000'000 * (100 + i);
     log.write_message(ipc::kTimingChannel, pose.utime, timing);
   }
@@ -185,6 +186,7 @@ TEST_F(EvaluateRun, GivesTheRowOfMethod) {
   EXPECT_NEAR(json.find("tracking_ms.mean")->number(), 100.0, 1e-9);
   EXPECT_NEAR(json.find("tracking_ms.p99")->number(), 198.0, 1e-9);
   EXPECT_NEAR(json.find("tracking_ms.max")->number(), 200.0, 1e-9);
+  EXPECT_NEAR(json.find("latency.p50_ms")->number(), 107.0, 1e-9);
 }
 
 TEST_F(EvaluateRun, TruthMovesToCamera0WhileTheScaleIsUnknown) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ipc/message.h"
+#include "tools/evaluate/run_times.h"
 #include "tools/trajectory/trajectory.h"
 
 namespace farpoint::tools {
@@ -41,6 +42,7 @@ struct RunLog {
   std::optional<landmarks_t> landmarks;
   std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
   std::vector<double> frame_ms;     // the same of the whole frame, mapping included where it runs in step
+  std::vector<TimedFrame> timed_frames;
   std::int64_t deadline_misses = 0;
   std::int64_t peak_resident_bytes = 0;  // 0: not told
 };

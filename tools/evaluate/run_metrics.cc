@@ -288,6 +288,8 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
     metrics.deadline_misses = run.log->deadline_misses;
   if (run.log->peak_resident_bytes > 0)
     metrics.peak_resident_mb = 1e-6 * static_cast<double>(run.log->peak_resident_bytes);
+  metrics.latency = measure_latency(run.log->timed_frames);
+  metrics.steadiness = measure_steadiness(run.log->timed_frames);
   if (run.log->summary) add_summary(*run.log->summary, &metrics);
   if (truth.world) add_landmarks(*run.log, truth_at_point, truth.world.get(), &metrics);
   return metrics;
@@ -309,6 +311,8 @@ Json to_json(const RunMetrics& metrics) {
   json.set("frame_ms", times_to_json(metrics.frame_ms));
   json.set("deadline_misses", or_null(metrics.deadline_misses));
   json.set("peak_resident_mb", or_null(metrics.peak_resident_mb));
+  json.set("latency", metrics.latency ? to_json(*metrics.latency) : Json());
+  json.set("steadiness", metrics.steadiness ? to_json(*metrics.steadiness) : Json());
   json.set("triangulation_depth_m", metrics.depth ? to_json(metrics.depth->triangulation_m) : Json());
   json.set("depth_over_50_m_percent", metrics.depth ? Json(metrics.depth->over_50_m_percent) : Json());
   json.set("depth_over_100_m_percent", metrics.depth ? Json(metrics.depth->over_100_m_percent) : Json());

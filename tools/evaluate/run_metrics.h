@@ -18,6 +18,7 @@
 #include "tools/evaluate/accuracy.h"
 #include "tools/evaluate/landmark_metrics.h"
 #include "tools/evaluate/log_input.h"
+#include "tools/evaluate/run_times.h"
 
 namespace farpoint::tools {
 
@@ -106,6 +107,8 @@ struct RunMetrics {
   std::vector<double> frame_ms;  // of a whole frame: in lockstep, tracking and mapping
   std::optional<std::int64_t> deadline_misses;
   std::optional<double> peak_resident_mb;  // of the process, up to the last frame; 10^6 bytes
+  std::optional<LatencyMetrics> latency;
+  std::optional<SteadinessMetrics> steadiness;
   std::optional<DepthMetrics> depth;
   std::optional<std::int64_t> map_points;
   std::optional<double> vmp_percent;         // points made through a virtual map point, of all points made

@@ -146,6 +146,8 @@ std::string details_text(const RunMetrics& metrics) {
     text += metrics.name + " maps: made=" + integer(metrics.maps) +
             " times_lost=" + integer(metrics.times_lost) + "\n";
   }
+  if (metrics.latency) text += latency_text(metrics.name, *metrics.latency);
+  if (metrics.steadiness) text += steadiness_text(metrics.name, *metrics.steadiness);
   if (metrics.landmarks) text += landmarks_text(metrics.name, *metrics.landmarks);
   for (const SegmentScale& segment : metrics.segments)
     text += metrics.name + " " + segment_text(segment) + "\n";

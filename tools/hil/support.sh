@@ -204,10 +204,10 @@ install_package() {
 }
 has_lcm_route() { ip route | grep -q 224.0.0.0/4; }
 
-# The package, a loopback camera, and LCM's route; nothing is started.
+# The package, a loopback camera, and LCM's route, which a running networkd sets; the service is not started.
 install_service() {
-  install_package /dev/video10
   systemctl start systemd-networkd
+  install_package /dev/video10
   wait_until 20 "LCM's route" has_lcm_route
   loopback
   udevadm settle

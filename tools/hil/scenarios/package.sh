@@ -22,6 +22,7 @@ grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the upgrade replace
 dpkg -r farpoint > /tmp/dpkg.log 2>&1 || fail "removal: $(tail -1 /tmp/dpkg.log)"
 ! systemctl -q is-active farpointd || fail "the removal left the service running"
 ! command -v farpointd || fail "the removal left the program"
+! has_lcm_route || fail "the removal left LCM's route"
 grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the removal took the configuration"
 [ -e /etc/farpoint/camera.yaml ] || fail "the removal took the camera file"
 dpkg -P farpoint > /tmp/dpkg.log 2>&1 || fail "purge: $(tail -1 /tmp/dpkg.log)"

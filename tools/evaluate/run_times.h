@@ -1,0 +1,47 @@
+// What FARPOINT_TIMING tells of a run besides the time of tracking: how old poses were when they went out,
+// and whether time and memory stay flat over a long run.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/common/json.h"
+
+namespace farpoint::tools {
+
+struct TimedFrame {
+  std::int64_t utime = 0;
+  double tracking_cpu_ms = -1.0, tracking_wall_ms = -1.0;  // negative: not measured
+  double latency_ms = -1.0;  // mid-exposure, or when the frame was due, to output; negative in lockstep
+  double resident_mb = 0.0;  // of the process; 10^6 bytes
+};
+
+struct LatencyMetrics {
+  double p50_ms = 0.0, p99_ms = 0.0, max_ms = 0.0;
+  // What is not tracking's own time; NaN where that was not measured.
+  double beyond_tracking_p50_ms = 0.0, beyond_tracking_p99_ms = 0.0;
+  double frame_period_ms = 0.0;         // median
+  std::int64_t later_than_a_frame = 0;  // frames whose latency is longer than a frame period
+};
+
+// Of tracking's CPU the 99th percentiles (NaN where it was not measured alone), of memory the values.
+struct SteadinessMetrics {
+  double second_twentieth_p99_ms = 0.0, last_twentieth_p99_ms = 0.0;
+  double tenth_mb = 0.0, half_mb = 0.0,
+         end_mb = 0.0;  // resident after a tenth of the frames, half of them, all
+};
+
+// Nothing in lockstep.
+[[nodiscard]] std::optional<LatencyMetrics> measure_latency(const std::vector<TimedFrame>& frames);
+// Nothing under 400 frames: a twentieth then has no 99th percentile to speak of.
+[[nodiscard]] std::optional<SteadinessMetrics> measure_steadiness(const std::vector<TimedFrame>& frames);
+
+// One line each, that begins with the run's name.
+[[nodiscard]] std::string latency_text(const std::string& name, const LatencyMetrics& metrics);
+[[nodiscard]] std::string steadiness_text(const std::string& name, const SteadinessMetrics& metrics);
+[[nodiscard]] Json to_json(const LatencyMetrics& metrics);
+[[nodiscard]] Json to_json(const SteadinessMetrics& metrics);
+
+}  // namespace farpoint::tools
