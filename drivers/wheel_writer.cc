@@ -15,6 +15,7 @@ WheelWriter::WheelWriter(const std::string& dbc_path, const std::string& names) 
       frame.id = signal.dbc.id;
       frame.size = static_cast<std::uint8_t>(signal.dbc.size);
     }
+    (void)signal.dbc.put(0.0, &frames_[at]);  // a range that leaves 0 out begins with its nearest
     wheels_.push_back({std::move(signal), at});
   }
 }

@@ -17,10 +17,11 @@ class WheelWriter {
   WheelWriter(const std::string& dbc_path, const std::string& names);
 
   // One frame for each message of the DBC, in the order in which they are named; valid until the next call.
-  // Of more wheels than signals the last ones are left out, of fewer the last signals stay 0.
+  // Of more wheels than signals the last ones are left out; of fewer, or not a number, signals stay as they
+  // were, at first at 0 m/s.
   [[nodiscard]] std::span<const ipc::CanFrame> frames(const wheels_t& message);
 
-  // Speeds that their signal could not hold, and that were put at its limit.
+  // Speeds that their signal could not hold, and that were put at its limit or, not a number, left out.
   [[nodiscard]] std::uint64_t limited() const { return limited_; }
   // Whether some message is longer than a classic frame.
   [[nodiscard]] bool needs_fd() const;

@@ -95,16 +95,31 @@ unsigned position_of(const DbcSignal& d, unsigned i) {
   return (d.start / 8 + in_row / 8) * 8 + (7 - in_row % 8);
 }
 
-// The numbers that so many bits hold. Of more than 53 a double cannot tell the last ones apart.
 struct RawLimits {
   double least = 0.0, most = 0.0;
+  [[nodiscard]] bool hold(double number) const { return number >= least && number <= most; }
 };
+// The numbers that so many bits hold. Of more than 53 a double cannot tell the last ones apart.
 RawLimits raw_limits(const DbcSignal& d) {
   constexpr unsigned kExactBits = 53;
   const unsigned bits = d.is_signed ? d.length - 1 : d.length;
   const double beyond = std::ldexp(1.0, static_cast<int>(bits));
   const double most = bits > kExactBits ? std::nextafter(beyond, 0.0) : beyond - 1.0;
   return {d.is_signed ? -beyond : 0.0, most};
+}
+
+// Of them those whose physical value lies in the signal's range. None: least > most.
+RawLimits limits_in_range(const DbcSignal& d, const RawLimits& bits) {
+  if (d.min == d.max) return bits;
+  constexpr double kRounding = 1e-6;  // of a step: what (max - offset) / factor may miss a whole number by
+  const double at_min = (d.min - d.offset) / d.factor, at_max = (d.max - d.offset) / d.factor;
+  return {std::max(bits.least, std::ceil(std::min(at_min, at_max) - kRounding)),
+          std::min(bits.most, std::floor(std::max(at_min, at_max) + kRounding))};
+}
+
+bool is_scaled_soundly(const DbcSignal& d) {
+  return std::isfinite(d.factor) && d.factor != 0.0 && std::isfinite(d.offset) && std::isfinite(d.min) &&
+         std::isfinite(d.max) && d.min <= d.max;
 }
 
 bool fits(const DbcSignal& d) {
@@ -136,10 +151,9 @@ double DbcSignal::value(const CanFrame& frame) const {
 }
 
 bool DbcSignal::put(double physical, CanFrame* frame) const {
-  if (std::isnan(physical) || factor == 0.0) return false;
-  const double allowed = min < max ? std::clamp(physical, min, max) : physical;
-  const RawLimits limits = raw_limits(*this);
-  const double wanted = std::nearbyint((allowed - offset) / factor);
+  const RawLimits bits = raw_limits(*this), limits = limits_in_range(*this, bits);
+  if (std::isnan(physical) || limits.least > limits.most) return false;
+  const double wanted = std::nearbyint((physical - offset) / factor);
   const double number = std::clamp(wanted, limits.least, limits.most);
   const std::uint64_t raw = is_signed ? static_cast<std::uint64_t>(static_cast<std::int64_t>(number))
                                       : static_cast<std::uint64_t>(number);
@@ -151,7 +165,8 @@ bool DbcSignal::put(double physical, CanFrame* frame) const {
     const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
     byte = static_cast<std::uint8_t>((raw >> i & 1) != 0 ? byte | mask : byte & ~mask);
   }
-  return allowed == physical && number == wanted;
+  const bool in_range = min == max || (physical >= min && physical <= max);
+  return in_range && bits.hold(wanted);
 }
 
 DbcSignal read_dbc_signal(const std::string& path, const std::string& message, const std::string& signal) {
@@ -178,6 +193,9 @@ DbcSignal read_dbc_signal(const std::string& path, const std::string& message, c
     if (!read_layout(s, &found))
       fail("signal " + signal + ": expected 'SG_ " + signal +
            " : start|length@order sign (factor,offset) [min|max] \"unit\"'");
+    if (!is_scaled_soundly(found))
+      fail("signal " + signal +
+           ": expected a factor other than 0, finite numbers, and a range whose end is not before its start");
     if (found.size == 0 || found.size > kMaxFrameBytes)
       fail("message " + message + " has " + std::to_string(found.size) + " bytes, expected 1 to " +
            std::to_string(kMaxFrameBytes));

@@ -23,8 +23,8 @@ struct DbcSignal {
   [[nodiscard]] double value(const CanFrame& frame) const;
 
   // Puts the nearest value that the signal can hold into a frame, which becomes one of its message; the bits
-  // of other signals stay. False where that is another than asked for: beyond the range or the bits, or NaN,
-  // which changes nothing. Precondition: as read_dbc_signal() gives it.
+  // of other signals stay. False where what is asked for is beyond the range or the bits; and where it is NaN
+  // or no number is in the range, which changes nothing. Precondition: as read_dbc_signal() gives it.
   [[nodiscard]] bool put(double physical, CanFrame* frame) const;
 };
 

@@ -21,6 +21,9 @@ class WheelWriterTest : public testing::Test {
                             "BO_ 292 Rear: 8 ABS\n"
                             " SG_ L : 0|16@1+ (0.001,0) [0|60] \"m/s\"  X\n"
                             " SG_ R : 16|16@1+ (0.001,0) [0|60] \"m/s\"  X\n"
+                            "BO_ 294 Shifted: 8 ABS\n"
+                            " SG_ L : 0|16@1+ (0.01,-67.67) [-67|300] \"km/h\"  X\n"
+                            " SG_ R : 16|16@1+ (0.01,-67.67) [-67|300] \"km/h\"  X\n"
                             "BO_ 293 Long: 24 ABS\n"
                             " SG_ L : 96|16@1- (0.01,0) [0|0] \"m/s\"  X\n";
   }
@@ -63,6 +66,16 @@ TEST_F(WheelWriterTest, ASpeedThatItsSignalCannotHoldIsCounted) {
   ASSERT_TRUE(reader.take(frames[1], 0, &heard));
   EXPECT_EQ(heard.wheel_speed[2], 0.0);
   EXPECT_NEAR(heard.wheel_speed[3], 60.0, 1e-9);
+}
+
+TEST_F(WheelWriterTest, WheelsThatAreNotGivenStandStill) {
+  const std::string names = "Shifted.L,Shifted.R";
+  WheelWriter writer(path_, names);
+  WheelReader reader(path_, names);
+  wheels_t heard{};
+  ASSERT_TRUE(reader.take(writer.frames(moving_at({2.0}))[0], 0, &heard));
+  EXPECT_NEAR(heard.wheel_speed[0], 2.0, 0.005 / 3.6 + 1e-9);
+  EXPECT_NEAR(heard.wheel_speed[1], 0.0, 0.005 / 3.6 + 1e-9);
 }
 
 TEST_F(WheelWriterTest, LongMessagesNeedCanFd) {

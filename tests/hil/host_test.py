@@ -5,6 +5,7 @@ The bench's checks on the host find what they are there to find: each on good da
 machine is started. And every scenario can be read.
 """
 
+import math
 import pathlib
 import struct
 import sys
@@ -193,6 +194,15 @@ class Wired(unittest.TestCase):
     def test_another_order(self):
         self.assertRegex(self.complaint([0, 1, 2, 4, 3, *range(5, 20)])[0], "^image 4 is frame 3, after frame 4")
 
+    def test_turn(self):
+        after_turn = [21, 22, 23, 24, 25]
+        late = lambda number: 16 * PERIOD_US  # noqa: E731
+        self.assertRegex(self.complaint([*range(15, 21), *after_turn], late)[1][0], "0 twice and 0 never$")
+        self.assertRegex(self.complaint([*range(15, 20), *after_turn], late)[1][0], "0 twice and 1 never$")
+        self.assertRegex(self.complaint([*range(15, 20), 19, 20, *after_turn], late)[1][0], "1 twice and 0 never$")
+        self.assertRegex(self.complaint([*range(15, 20), 22, 23], late, least="5")[0],
+                         "^image 5 is frame 18, the one before was frame 19|^image 5 is frame 18, after frame 19")
+
     def test_time(self):
         self.assertRegex(self.complaint(late=lambda number: -200_000)[0], "^image 0 .* which was not sent just before")
         self.assertRegex(self.complaint(late=lambda number: 600_000)[0], "^image 0 .* which was not sent just before")
@@ -206,7 +216,7 @@ class Wired(unittest.TestCase):
 class Streamed(unittest.TestCase):
     """Ten frames at 20 Hz and as many wheel speeds, streamed at half the pace from 5 s on."""
 
-    def complaint(self, late=lambda number: 0, pixel=None, missing=None, speed=0.0, wheels_late_us=0):
+    def complaint(self, late=lambda number: 0, pixel=None, missing=None, speed=0.0, wheels_late_us=0, wheels=4):
         made, came, turned = [], [], []
         for number in range(10):
             utime = 50_000 * number
@@ -217,8 +227,9 @@ class Streamed(unittest.TestCase):
                 events.append(("CAMERA_0", bytes(8) + head + pixels))
             turn = (made, utime, 4 * [1.0]), (turned, due + wheels_late_us, [1.0, 1.0, 1.0, 1.0 + speed])
             for events, time, speeds in turn:
-                head = lcm_log.WHEELS.pack(time, 1.0, -1.0, 0.0, 0.0, 4)
-                events.append(("WHEELS", bytes(8) + head + struct.pack(">4d", *speeds)))
+                speeds = speeds[:4 if events is made else wheels]
+                head = lcm_log.WHEELS.pack(time, 1.0, -1.0, 0.0, 0.0, len(speeds))
+                events.append(("WHEELS", bytes(8) + head + struct.pack(f">{len(speeds)}d", *speeds)))
         if missing is not None:
             del came[missing]
         with tempfile.TemporaryDirectory() as name:
@@ -250,6 +261,8 @@ class Streamed(unittest.TestCase):
 
     def test_other_speed(self):
         self.assertRegex(self.complaint(speed=0.0015), "^wheels 0: ")
+        self.assertRegex(self.complaint(speed=math.nan), "^wheels 0: ")
+        self.assertRegex(self.complaint(wheels=3), "^wheels 0: ")
 
 
 class Bars(unittest.TestCase):

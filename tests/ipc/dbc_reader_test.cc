@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <fstream>
@@ -28,7 +29,13 @@ constexpr const char* kText =
     "BO_ 293 Long: 64 ABS\n"
     " SG_ Last : 496|16@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
     "BO_ 294 TooLong: 65 ABS\n"
-    " SG_ First : 0|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n";
+    " SG_ First : 0|8@1+ (1,0) [0|0] \"\"  Vector__XXX\n"
+    "BO_ 295 Odd: 8 ABS\n"
+    " SG_ NoFactor : 0|8@1+ (0,0) [0|0] \"\"  Vector__XXX\n"
+    " SG_ NanFactor : 0|8@1+ (nan,0) [0|0] \"\"  Vector__XXX\n"
+    " SG_ NanOffset : 0|8@1+ (1,nan) [0|0] \"\"  Vector__XXX\n"
+    " SG_ Infinite : 0|8@1+ (1,0) [0|inf] \"\"  Vector__XXX\n"
+    " SG_ Backwards : 0|8@1+ (1,0) [100|0] \"\"  Vector__XXX\n";
 
 class DbcText : public testing::Test {
  protected:
@@ -132,6 +139,38 @@ TEST_F(DbcText, WhatDoesNotFitIsPutAtTheLimitAndSaid) {
   EXPECT_EQ(frame.data, before.data);
 }
 
+// Ranges that end between two steps: what is put in is never outside, so that it is read again.
+TEST(DbcSignal, WhatIsPutAtALimitIsInTheRange) {
+  CanFrame frame;
+  for (const double factor : {0.01, 0.4, 1.0 / 256.0, -0.01, 3.0}) {
+    for (int sixteenths = 16; sixteenths < 48; ++sixteenths) {
+      DbcSignal s;
+      s.length = 16;
+      s.is_signed = true;
+      s.factor = factor;
+      s.min = -std::abs(factor) * sixteenths / 16.0;
+      s.max = std::abs(factor) * (sixteenths + 7) / 16.0;
+      for (const double physical : {s.min, s.max, 2.0 * s.min, 2.0 * s.max}) {
+        EXPECT_EQ(s.put(physical, &frame), physical == s.min || physical == s.max);
+        EXPECT_LE(s.value(frame), s.max + 1e-9);
+        EXPECT_GE(s.value(frame), s.min - 1e-9);
+        EXPECT_LE(std::abs(s.value(frame) - std::clamp(physical, s.min, s.max)), std::abs(factor));
+      }
+    }
+  }
+}
+
+TEST(DbcSignal, ARangeThatHoldsNoNumberTakesNothing) {
+  DbcSignal s;
+  s.length = 8;
+  s.min = 0.25;
+  s.max = 0.75;
+  CanFrame frame;
+  EXPECT_FALSE(s.put(0.5, &frame));
+  EXPECT_EQ(frame.id, CanFrame{}.id);
+  EXPECT_EQ(frame.data, CanFrame{}.data);
+}
+
 TEST(DbcSignal, SixtyFourBitsHoldTheirLimits) {
   DbcSignal whole;
   whole.length = 64;
@@ -152,6 +191,8 @@ TEST_F(DbcText, MistakesAreNamed) {
   EXPECT_EQ(complaint("Wheels", "Outside"), path_ + ":6: signal Outside lies outside its frame of 8 bytes");
   EXPECT_NE(complaint("Wheels", "Broken").find(":7: signal Broken: expected"), std::string::npos);
   EXPECT_NE(complaint("Far", "X").find("extended identifier"), std::string::npos);
+  for (const char* name : {"NoFactor", "NanFactor", "NanOffset", "Infinite", "Backwards"})
+    EXPECT_NE(complaint("Odd", name).find("expected a factor other than 0"), std::string::npos) << name;
   EXPECT_THROW((void)read_dbc_signal("/nonexistent.dbc", "A", "B"), std::runtime_error);
 }
 

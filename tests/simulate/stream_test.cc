@@ -7,6 +7,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -222,6 +223,22 @@ TEST(FramesAhead, WhatRenderingThrowsComesAfterTheFramesBefore) {
   EXPECT_THROW((void)frames.next(&images), std::runtime_error);
 }
 
+TEST(FramesAhead, WhereNotOneIsRenderedWaitingForThemSaysWhy) {
+  FramesAhead frames([](std::int64_t) -> FrameImages { throw std::runtime_error("no paint"); }, 20, 4);
+  EXPECT_THROW((void)frames.is_ahead(), std::runtime_error);
+}
+
+TEST(LogSink, SaysWhatItLeavesWhereTheStreamIsAbandoned) {
+  const ScratchFolder folder;
+  const std::string log = (folder / "run.lcm").string();
+  LogSink sink(log);
+  sink.take_truth(ground_truth_t{});
+  EXPECT_EQ(sink.abandon(), "; the log so far is kept as " + log + ".incomplete");
+  EXPECT_EQ(sink.abandon(), "");
+  EXPECT_TRUE(std::filesystem::exists(log + ".incomplete"));
+  EXPECT_FALSE(std::filesystem::exists(log));
+}
+
 TEST(FramesAhead, IsGivenUpWhileItWaits) {
   FramesAhead frames([](std::int64_t) { return FrameImages(1); }, std::numeric_limits<std::int64_t>::max(),
                      2);
@@ -278,13 +295,14 @@ TEST_F(StreamTest, DevicesGetTheImagesThatALogHasStampedAsMessagesAre) {
 
 // The complaint that a device's fault ends a stream with.
 std::string complaint_with(
-    test::FakeOutput* device, const std::function<void()>& during = [] {}) {
+    test::FakeOutput* device, const std::function<void()>& during = [] {}, double pace = 1.0) {
   Simulation simulation(request_for("yard", 64, 48, 2.0));
   FakeClock clock;
   StreamSinks sinks;
   sinks.push_back(std::make_unique<VideoSink>(0, "/dev/video10", drivers::OutputFormat{64, 48, 20.0},
                                               device->make_system()));
   StreamOptions options;
+  options.pace = pace;
   options.progress = [&](std::int64_t frames) {
     if (frames == 6) during();
   };
@@ -309,6 +327,13 @@ TEST(StreamVideo, ADeviceThatKeepsItsBuffersIsGivenUp) {
   EXPECT_EQ(complaint_with(&device, [&] { device.held = 1; }),
             "/dev/video10: has held all of its buffers for 1 s, expected it to give one back");
   EXPECT_EQ(device.images.size(), 6U);
+}
+
+TEST(StreamVideo, ASlowStreamWaitsForABufferAsLongAsThreeOfItsImagesTake) {
+  test::FakeOutput device;  // 20 images a second at a hundredth of the pace: 5 s each
+  EXPECT_EQ(complaint_with(
+                &device, [&] { device.held = 1; }, 0.01),
+            "/dev/video10: has held all of its buffers for 15 s, expected it to give one back");
 }
 #endif
 
@@ -436,6 +461,7 @@ TEST(StreamProgram, BadDevicesAreOneLine) {
       {"--stream --lcm-url --pictures .", kExitMisused, "--pictures"},
       {"--stream --lcm-url nonsense://", kExitFailed, "cannot publish on 'nonsense://'"},
       {"--stream --video /dev/video10 --second-video /dev/video11", kExitMisused, "--stereo"},
+      {"--stream --lcm-url --every 5", kExitMisused, "--pictures"},
       {"--stream --lcm-url --pace 0", kExitMisused, "--pace"}};
 #ifdef FARPOINT_WITH_V4L2
   cases.push_back({"--stream --video /dev/null", kExitFailed, "/dev/null: is no video device"});

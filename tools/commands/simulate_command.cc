@@ -159,8 +159,10 @@ void add_simulate_command(CLI::App* app, Action* action) {
                       "WIDTHxHEIGHT in pixels, with the same lens (default: the camera's)");
   command->add_option("--format", options->format, "Of the images: grey (default) or mjpeg")
       ->check(CLI::IsMember({"grey", "mjpeg"}));
-  command->add_option("--pictures", options->pictures, "Folder for some images as PNG files");
+  CLI::Option* pictures =
+      command->add_option("--pictures", options->pictures, "Folder for some images as PNG files");
   command->add_option("--every", options->every, "With --pictures: every so many frames (default 50)")
+      ->needs(pictures)
       ->check(CLI::Range(1, 1000000));
   add_stream_options(command, options.get());
   command->footer(
@@ -171,9 +173,9 @@ void add_simulate_command(CLI::App* app, Action* action) {
       "--stream: stamps of images and utime of messages are of CLOCK_MONOTONIC, as farpointd's are, so that "
       "truth can "
       "be\n"
-      "compared with what it publishes live. Images are rendered ahead; what goes out more than 2 ms after "
-      "its time "
-      "is\n"
+      "compared with what it publishes live. Images are rendered ahead; those that go out more than 2 ms "
+      "after their "
+      "time are\n"
       "counted as late, and the last line says how much of the pace was reached. Ctrl-C and SIGTERM end it "
       "in order.\n"
       "Examples:\n"

@@ -127,7 +127,13 @@ void run_stream(const StreamRequest& request, simulate::Simulation* simulation) 
     options.stop = [] { return simulate::StopSignals::received() != 0; };
     options.started = [&](std::int64_t start_us) { print_start(out, *simulation, request.pace, start_us); };
     options.progress = [&](std::int64_t done) { progress.advance(static_cast<std::size_t>(done)); };
-    result = simulate::stream(*simulation, &frames, sinks, &clock, options);
+    try {
+      result = simulate::stream(*simulation, &frames, sinks, &clock, options);
+    } catch (const RunError& error) {
+      std::string text = error.what();
+      for (const auto& sink : sinks) text += sink->abandon();
+      throw RunError(text);
+    }
   }
   print_end(out, *simulation, result, sinks);
 }

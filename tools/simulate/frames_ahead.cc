@@ -42,7 +42,9 @@ bool FramesAhead::wait_for_room(std::unique_lock<std::mutex>* lock) {
 
 bool FramesAhead::is_ahead() {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, kPatience, [this] { return ended_ || ready_.size() >= ahead_; });
+  const bool is = changed_.wait_for(lock, kPatience, [this] { return ended_ || ready_.size() >= ahead_; });
+  if (ready_.empty() && failure_) std::rethrow_exception(failure_);
+  return is;
 }
 
 bool FramesAhead::next(FrameImages* images) {

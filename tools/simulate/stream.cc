@@ -15,8 +15,10 @@ constexpr std::int64_t kSecond_us = 1'000'000;
 constexpr std::int64_t kLead_us = 100'000;
 // So often a stop is looked for while nothing is due.
 constexpr std::int64_t kSlice_us = 100'000;
-// A device that holds all of its buffers is asked again so soon, and given up so late.
-constexpr std::int64_t kRetry_us = 1000, kPatience_us = kSecond_us;
+// A device that holds all of its buffers is asked again so soon, and given up after so many periods of the
+// images, a second at least: it may give them back at their rate.
+constexpr std::int64_t kRetry_us = 1000;
+constexpr double kPatience_periods = 3.0;
 
 class Streamer {
  public:
@@ -28,7 +30,9 @@ class Streamer {
         clock_(*clock),
         options_(options),
         motion_(simulation),
-        calibration_(calibration_of(simulation)) {}
+        calibration_(calibration_of(simulation)),
+        patience_us_(std::max(kSecond_us, std::lround(kPatience_periods * 1e6 / options.pace /
+                                                      simulation.description().camera.rate_hz))) {}
 
   StreamResult run() {
     while (!options_.stop() && !frames_.is_ahead()) continue;
@@ -94,9 +98,9 @@ class Streamer {
     const std::int64_t since_us = clock_.now_us();
     while (!sink->take_image(image)) {
       const std::int64_t now_us = clock_.now_us();
-      if (now_us - since_us > kPatience_us)
+      if (now_us - since_us > patience_us_)
         throw RunError(sink->name() + ": has held all of its buffers for " +
-                       std::to_string(kPatience_us / kSecond_us) + " s, expected it to give one back");
+                       std::to_string(patience_us_ / kSecond_us) + " s, expected it to give one back");
       clock_.sleep_until(now_us + kRetry_us);
     }
   }
@@ -128,6 +132,7 @@ class Streamer {
   const StreamOptions& options_;
   MotionMeasurements motion_;
   calibration_t calibration_;
+  std::int64_t patience_us_;
   std::int64_t start_us_ = 0, housekeeping_us_ = 0;
   StreamResult result_;
 };

@@ -88,9 +88,8 @@ LogSink::~LogSink() {
 template <typename Message>
 void LogSink::write(const std::string& channel, const Message& message) {
   if (log_->write_message(channel, message.utime, message)) return;
-  ended_ = true;
-  const std::string why = log_->error(), kept = log_->keep_incomplete();
-  throw RunError(file_ + ": " + why + (kept.empty() ? "" : "; the log so far is kept as " + kept));
+  const std::string why = log_->error();
+  throw RunError(file_ + ": " + why + abandon());
 }
 
 void LogSink::take_calibration(const calibration_t& message) {
@@ -113,6 +112,13 @@ void LogSink::take_truth(const ground_truth_t& message) {
 bool LogSink::take_image(const image_t& message) {
   write(ipc::kCameraChannelPrefix + std::to_string(message.camera), message);
   return true;
+}
+
+std::string LogSink::abandon() {
+  if (ended_) return {};
+  ended_ = true;
+  const std::string kept = log_->keep_incomplete();
+  return kept.empty() ? "" : "; the log so far is kept as " + kept;
 }
 
 void LogSink::close() {

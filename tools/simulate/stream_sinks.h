@@ -35,6 +35,8 @@ class StreamSink {
   virtual void maintain() {}
   // All was sent.
   virtual void close() {}
+  // The stream ended by an error: what is to be said of what is left behind, to go on in its message.
+  [[nodiscard]] virtual std::string abandon() { return {}; }
   [[nodiscard]] virtual std::string name() const = 0;
   // What did not get through, for the last line; empty: nothing.
   [[nodiscard]] virtual std::string losses() const { return {}; }
@@ -100,6 +102,7 @@ class LogSink final : public StreamSink {
   void take_truth(const ground_truth_t& message) override;
   [[nodiscard]] bool take_image(const image_t& message) override;
   void close() override;
+  [[nodiscard]] std::string abandon() override;
   [[nodiscard]] std::string name() const override { return file_; }
 
  private:

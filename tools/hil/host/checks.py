@@ -3,6 +3,7 @@
 import pathlib
 import re
 import struct
+import typing
 
 from host import can_bus, lcm_log
 from host.material import NotMade, run as run_program
@@ -60,6 +61,28 @@ def images(folder, stock, log, of, tolerance_us="0", may_miss="0", channel="CAME
                   f"time off by at most {1e-3 * worst_us:.1f} ms"]
 
 
+class Way(typing.NamedTuple):
+    """A way to read images as frames: how many came twice or never, how long after they were sent."""
+    off: int = 0
+    twice: int = 0
+    never: int = 0
+    least_us: int = 1 << 62
+    most_us: int = 0
+
+
+def go_on(ways, at, late_us):
+    """The best of the ways, by their last frame, that frame `at` carries on; where frames run forwards and backwards two
+    of them look the same around the turn."""
+    before = {at - 1: Way()} if ways is None else ways
+    found = []
+    for last, way in before.items():
+        if last <= at <= last + 2:
+            twice, never = at == last, max(0, at - last - 1)
+            found.append(Way(way.off + twice + never, way.twice + twice, way.never + never,
+                             min(way.least_us, late_us), max(way.most_us, late_us)))
+    return min(found, default=None)
+
+
 def wired(folder, stock, log, of, period_us, least, most_off):
     """Every image is a frame that was played, in order, byte for byte, taken after it was sent and before it can have
     gone: the output's buffers and two periods later. They are a period apart, give or take half of one. The clocks of
@@ -70,7 +93,7 @@ def wired(folder, stock, log, of, period_us, least, most_off):
     places = {}
     for at, (index, _) in enumerate(frames):
         places.setdefault(pixels[index * FRAME_BYTES:(index + 1) * FRAME_BYTES], []).append(at)
-    period_us, last, before_us, off, late_us = int(period_us), None, None, [0, 0], []
+    period_us, before_us, ways = int(period_us), None, None
     came = [image for _, image in lcm_log.images(folder / log)]
     for number, image in enumerate(came):
         same = places.get(image.pixels, [])
@@ -79,25 +102,25 @@ def wired(folder, stock, log, of, period_us, least, most_off):
         in_time = [at for at in same if 0 <= image.utime - frames[at][1] <= (OUTPUT_BUFFERS + 2) * period_us]
         if not in_time:
             return f"image {number} of time {image.utime} is frame {same[0]}, which was not sent just before", []
-        following = [at for at in in_time if last is None or at >= last]
-        if not following:
-            return f"image {number} is frame {in_time[0]}, after frame {last}", []
+        onward = {}
+        for at in in_time:
+            way = go_on(ways, at, image.utime - frames[at][1])
+            if way is not None:
+                onward[at] = way
+        if not onward:
+            word = "after frame" if in_time[-1] < min(ways) else "the one before was frame"
+            return f"image {number} is frame {in_time[0]}, {word} {min(ways)}", []
         if before_us is not None and abs(image.utime - before_us - period_us) > period_us / 2:
             return f"image {number} came {1e-3 * (image.utime - before_us):.1f} ms after the one before", []
-        if last is not None:
-            if following[0] > last + 2:
-                return f"image {number} is frame {following[0]}, the one before was frame {last}", []
-            off[0] += following[0] == last
-            off[1] += max(0, following[0] - last - 1)
-        last, before_us = following[0], image.utime
-        late_us.append(image.utime - frames[last][1])
+        ways, before_us = onward, image.utime
     if len(came) < int(least):
         return f"{len(came)} images, expected {least}", []
-    text = f"{off[0]} twice and {off[1]} never"
-    if sum(off) > int(most_off):
+    way = min(ways.values())
+    text = f"{way.twice} twice and {way.never} never"
+    if way.off > int(most_off):
         return f"{text} of {len(came)} frames, expected at most {most_off}", []
-    return None, [f"{len(came)} images, each a frame, in order, byte for byte, {1e-3 * min(late_us):.0f} to "
-                  f"{1e-3 * max(late_us):.0f} ms after it was sent; {text}"]
+    return None, [f"{len(came)} images, each a frame, in order, byte for byte, {1e-3 * way.least_us:.0f} to "
+                  f"{1e-3 * way.most_us:.0f} ms after it was sent; {text}"]
 
 
 # The luma of the eight colour bars at 75 %: white, yellow, cyan, green, magenta, red, blue, black.
@@ -233,8 +256,10 @@ def wheels(folder, stock, log, bus_log, count):
         return f"{len(came)} WHEELS of {len(sent)} pairs on the bus, expected {count}", []
     worst_s = 0.0
     for number, ((time_s, speeds), (utime, speed, wheel_speeds)) in enumerate(zip(sent, came)):
+        if len(wheel_speeds) != 4:
+            return f"wheels {number}: {len(wheel_speeds)} wheels, expected 4", []
         for is_m_s, must_m_s in zip((*wheel_speeds, speed), (*speeds, sum(speeds) / 4)):
-            if abs(is_m_s - must_m_s) > 1e-9:
+            if not abs(is_m_s - must_m_s) <= 1e-9:
                 return f"wheels {number}: {is_m_s:.4f} m/s, expected {must_m_s:.4f}", []
         worst_s = max(worst_s, abs(1e-6 * (utime - monotonic_us + real_us) - time_s))
     if worst_s > 0.01:
@@ -274,7 +299,8 @@ def streamed(folder, stock, log, output, said, size, seconds):
                 f"expected {len(must)} and {len(must_turn)}"), []
     worst_us = 0.0
     for number, ((utime, _, speeds), (must_utime, _, must_speeds)) in enumerate(zip(turned, must_turn)):
-        if any(abs(is_m_s - must_m_s) > WHEEL_M_S for is_m_s, must_m_s in zip(speeds, must_speeds)):
+        near = [abs(is_m_s - must_m_s) <= WHEEL_M_S for is_m_s, must_m_s in zip(speeds, must_speeds)]
+        if len(speeds) != len(must_speeds) or not all(near):
             return f"wheels {number}: {speeds}, expected {must_speeds}", []
         worst_us = max(worst_us, abs(utime - due_us(must_utime)))
     if worst_us > 10_000:

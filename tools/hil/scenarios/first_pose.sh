@@ -48,6 +48,8 @@ if [ ! -e "$left/prepared" ]; then
   systemctl reboot
   sleep infinity
 fi
+echo "booted" >> "$left/prepared"
+[ "$(wc -l < "$left/prepared")" = 1 ] || fail "the machine booted once more by itself: see its console"
 [ -n "$(journalctl -b -o cat -u camera --no-pager)" ] || fail "the camera was not started by the boot"
 systemctl -q is-active farpointd || fail "the service is not active after the boot"
 wait_until 30 "the service tracks frames" service_tracks
