@@ -16,6 +16,7 @@ fail() {
   echo "$*" > /tmp/complaint
   echo "complaint: $*"
   tail -20 $daemon_log 2> /dev/null
+  journalctl -b -u systemd-networkd -u dbus -o short-monotonic --no-pager 2> /dev/null | tail -20
   journalctl -u farpointd --since "@$began" -o short-monotonic --no-pager 2> /dev/null | tail -40
   exit 1
 }
@@ -204,8 +205,14 @@ install_package() {
 }
 has_lcm_route() { ip route | grep -q 224.0.0.0/4; }
 
+# read_first FILE...: they and the libraries of those that are programs are in memory. The machine's time jumps, beyond
+# the patience of services, while it waits for its disk.
+read_first() { cat "$@" $(ldd "$@" 2> /dev/null | grep -o "/[^ :]*" | sort -u) > /dev/null 2>&1; }
+
 # The package, a loopback camera, and LCM's route, which a running networkd sets; the service is not started.
 install_service() {
+  read_first /lib/systemd/systemd-{networkd,udevd} /usr/bin/{dpkg,dpkg-deb,tar,networkctl,systemctl,udevadm} \
+    /usr/bin/systemd-{sysusers,tmpfiles} /usr/sbin/ip "$root/farpoint.deb"
   systemctl start systemd-networkd
   install_package /dev/video10
   wait_until 20 "LCM's route" has_lcm_route
