@@ -80,12 +80,16 @@ std::optional<MotionSample> MotionMeasurements::next(double until_s) {
   const double wheels_s = wheels_ ? static_cast<double>(wheel_samples_) / world.wheels->rate_hz : kNever_s;
   const double time_s = std::min(imu_s, wheels_s);
   if (time_s > until_s + 1e-9) return std::nullopt;
+  std::optional<MotionSample> sample(std::in_place);
+  sample->time_s = time_s;
   if (imu_s <= wheels_s) {
     ++imu_samples_;
-    return MotionSample{time_s, imu_->sample(simulation_.body(), time_s)};
+    sample->message = imu_->sample(simulation_.body(), time_s);
+  } else {
+    ++wheel_samples_;
+    sample->message = wheels_->sample(simulation_.body(), time_s);
   }
-  ++wheel_samples_;
-  return MotionSample{time_s, wheels_->sample(simulation_.body(), time_s)};
+  return sample;
 }
 
 }  // namespace farpoint::tools::simulate
