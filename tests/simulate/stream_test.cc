@@ -279,6 +279,7 @@ TEST_F(StreamTest, DevicesGetTheImagesThatALogHasStampedAsMessagesAre) {
   sinks_.push_back(std::make_unique<SeeingSink>(&clock_, &seen_));
   FramesAhead frames(renderer_of(&simulation), simulation.frames(), 3);
   result_ = stream(simulation, &frames, sinks_, &clock_, options_);
+  sinks_.clear();  // before the devices that they hold
   const std::vector<Seen> truth = of("truth");
   for (std::size_t camera = 0; camera < 2; ++camera) {
     const auto expected = recorded_images(request, "CAMERA_" + std::to_string(camera));
