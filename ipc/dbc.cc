@@ -108,9 +108,17 @@ RawLimits raw_limits(const DbcSignal& d) {
   return {d.is_signed ? -beyond : 0.0, most};
 }
 
+bool has_range(const DbcSignal& d) {
+  return d.min != d.max;
+}
+
+bool in_range(const DbcSignal& d, double physical, double tolerance) {
+  return !has_range(d) || (physical >= d.min - tolerance && physical <= d.max + tolerance);
+}
+
 // Of them those whose physical value lies in the signal's range. None: least > most.
 RawLimits limits_in_range(const DbcSignal& d, const RawLimits& bits) {
-  if (d.min == d.max) return bits;
+  if (!has_range(d)) return bits;
   constexpr double kRounding = 1e-6;  // of a step: what (max - offset) / factor may miss a whole number by
   const double at_min = (d.min - d.offset) / d.factor, at_max = (d.max - d.offset) / d.factor;
   return {std::max(bits.least, std::ceil(std::min(at_min, at_max) - kRounding)),
@@ -145,9 +153,7 @@ double DbcSignal::value(const CanFrame& frame) const {
   }
   const double physical = number * factor + offset;
   // A sensor says 'not available' with a value beyond its range.
-  const double tolerance = 0.5 * std::abs(factor);
-  const bool in_range = min == max || (physical >= min - tolerance && physical <= max + tolerance);
-  return in_range ? physical : kNan;
+  return in_range(*this, physical, 0.5 * std::abs(factor)) ? physical : kNan;
 }
 
 bool DbcSignal::put(double physical, CanFrame* frame) const {
@@ -165,8 +171,7 @@ bool DbcSignal::put(double physical, CanFrame* frame) const {
     const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
     byte = static_cast<std::uint8_t>((raw >> i & 1) != 0 ? byte | mask : byte & ~mask);
   }
-  const bool in_range = min == max || (physical >= min && physical <= max);
-  return in_range && bits.hold(wanted);
+  return in_range(*this, physical, 0.0) && bits.hold(wanted);
 }
 
 DbcSignal read_dbc_signal(const std::string& path, const std::string& message, const std::string& signal) {

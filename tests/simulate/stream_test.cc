@@ -272,14 +272,14 @@ TEST_F(StreamTest, DevicesGetTheImagesThatALogHasStampedAsMessagesAre) {
   request.stereo = true;
   Simulation simulation(request);
   std::array<test::FakeOutput, 2> devices;
+  StreamSinks sinks;  // ends before the devices that it holds
   for (int i = 0; i < 2; ++i)
-    sinks_.push_back(std::make_unique<VideoSink>(i, "/dev/video1" + std::to_string(i),
-                                                 drivers::OutputFormat{64, 48, 20.0},
-                                                 devices.at(static_cast<std::size_t>(i)).make_system()));
-  sinks_.push_back(std::make_unique<SeeingSink>(&clock_, &seen_));
+    sinks.push_back(std::make_unique<VideoSink>(i, "/dev/video1" + std::to_string(i),
+                                                drivers::OutputFormat{64, 48, 20.0},
+                                                devices.at(static_cast<std::size_t>(i)).make_system()));
+  sinks.push_back(std::make_unique<SeeingSink>(&clock_, &seen_));
   FramesAhead frames(renderer_of(&simulation), simulation.frames(), 3);
-  result_ = stream(simulation, &frames, sinks_, &clock_, options_);
-  sinks_.clear();  // before the devices that they hold
+  result_ = stream(simulation, &frames, sinks, &clock_, options_);
   const std::vector<Seen> truth = of("truth");
   for (std::size_t camera = 0; camera < 2; ++camera) {
     const auto expected = recorded_images(request, "CAMERA_" + std::to_string(camera));

@@ -151,12 +151,11 @@ class RunCollector {
   bool add_timing(const ipc::LogEvent& event) {
     timing_t message{};
     if (!ipc::decode(event.data, &message)) return false;
-    const double tracking_ms = message.cpu_ms[timing_t::STAGE_TRACKING];
-    if (tracking_ms >= 0.0) log_.tracking_ms.push_back(tracking_ms);
     const double frame_ms = message.cpu_ms[timing_t::STAGE_FRAME];
     if (frame_ms >= 0.0) log_.frame_ms.push_back(frame_ms);
-    log_.timed_frames.push_back({message.utime, tracking_ms, message.wall_ms[timing_t::STAGE_TRACKING],
-                                 message.latency_ms, 1e-6 * static_cast<double>(message.resident_bytes)});
+    log_.timed_frames.push_back({message.utime, message.cpu_ms[timing_t::STAGE_TRACKING],
+                                 message.wall_ms[timing_t::STAGE_TRACKING], message.latency_ms,
+                                 1e-6 * static_cast<double>(message.resident_bytes)});
     if (message.deadline_missed != 0) ++log_.deadline_misses;
     log_.peak_resident_bytes = std::max(log_.peak_resident_bytes, message.peak_resident_bytes);
     return true;

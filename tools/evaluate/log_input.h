@@ -40,9 +40,8 @@ struct RunLog {
   std::int32_t resets = 0;      // highest reset counter published
   std::optional<summary_t> summary;
   std::optional<landmarks_t> landmarks;
-  std::vector<double> tracking_ms;  // thread CPU time of each frame's tracking
-  std::vector<double> frame_ms;     // the same of the whole frame, mapping included where it runs in step
   std::vector<TimedFrame> timed_frames;
+  std::vector<double> frame_ms;  // thread CPU time of whole frames, mapping included where it runs in step
   std::int64_t deadline_misses = 0;
   std::int64_t peak_resident_bytes = 0;  // 0: not told
 };

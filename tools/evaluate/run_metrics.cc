@@ -282,9 +282,9 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
   if (!run.log) return metrics;
   metrics.live_metrics = measured(run.log->live_trajectory);
   metrics.resets = run.log->resets;
-  metrics.tracking_ms = run.log->tracking_ms;
+  metrics.tracking_ms = tracking_times_ms(run.log->timed_frames);
   metrics.frame_ms = run.log->frame_ms;
-  if (!run.log->tracking_ms.empty() || !run.log->frame_ms.empty())
+  if (!metrics.tracking_ms.empty() || !metrics.frame_ms.empty())
     metrics.deadline_misses = run.log->deadline_misses;
   if (run.log->peak_resident_bytes > 0)
     metrics.peak_resident_mb = 1e-6 * static_cast<double>(run.log->peak_resident_bytes);

@@ -1,7 +1,5 @@
 #include "tools/evaluate/run_times.h"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 #include <cstddef>
 
@@ -19,15 +17,19 @@ double median_period_ms(const std::vector<TimedFrame>& frames) {
   return percentile(std::move(periods_ms), 50.0);
 }
 
-double tracking_p99_ms(const std::vector<TimedFrame>& frames, std::size_t from, std::size_t to) {
-  std::vector<double> times_ms;
-  for (std::size_t i = from; i < to; ++i) {
-    if (frames[i].tracking_cpu_ms >= 0.0) times_ms.push_back(frames[i].tracking_cpu_ms);
-  }
-  return percentile(std::move(times_ms), 99.0);
+double tracking_p99_ms(std::span<const TimedFrame> frames) {
+  return percentile(tracking_times_ms(frames), 99.0);
 }
 
 }  // namespace
+
+std::vector<double> tracking_times_ms(std::span<const TimedFrame> frames) {
+  std::vector<double> times_ms;
+  for (const TimedFrame& frame : frames) {
+    if (frame.tracking_cpu_ms >= 0.0) times_ms.push_back(frame.tracking_cpu_ms);
+  }
+  return times_ms;
+}
 
 std::optional<LatencyMetrics> measure_latency(const std::vector<TimedFrame>& frames) {
   LatencyMetrics metrics;
@@ -52,27 +54,12 @@ std::optional<SteadinessMetrics> measure_steadiness(const std::vector<TimedFrame
   const std::size_t n = frames.size();
   if (n < kFewestFrames) return std::nullopt;
   SteadinessMetrics metrics;
-  metrics.second_twentieth_p99_ms = tracking_p99_ms(frames, n / 20, n / 10);
-  metrics.last_twentieth_p99_ms = tracking_p99_ms(frames, n - n / 20, n);
+  metrics.second_twentieth_p99_ms = tracking_p99_ms(std::span(frames).subspan(n / 20, n / 10 - n / 20));
+  metrics.last_twentieth_p99_ms = tracking_p99_ms(std::span(frames).last(n / 20));
   metrics.tenth_mb = frames[n / 10 - 1].resident_mb;
   metrics.half_mb = frames[n / 2 - 1].resident_mb;
   metrics.end_mb = frames[n - 1].resident_mb;
   return metrics;
-}
-
-std::string latency_text(const std::string& name, const LatencyMetrics& m) {
-  return fmt::format(
-      "{} latency: p50_ms={:.2f} p99_ms={:.2f} max_ms={:.1f} beyond_tracking_p50_ms={:.2f} "
-      "beyond_tracking_p99_ms={:.2f} frame_period_ms={:.1f} later_than_a_frame={}\n",
-      name, m.p50_ms, m.p99_ms, m.max_ms, m.beyond_tracking_p50_ms, m.beyond_tracking_p99_ms,
-      m.frame_period_ms, m.later_than_a_frame);
-}
-
-std::string steadiness_text(const std::string& name, const SteadinessMetrics& m) {
-  return fmt::format(
-      "{} steadiness: tracking_p99_ms second twentieth {:.2f}, last {:.2f}; "
-      "resident_mb after a tenth {:.1f}, half {:.1f}, all {:.1f}\n",
-      name, m.second_twentieth_p99_ms, m.last_twentieth_p99_ms, m.tenth_mb, m.half_mb, m.end_mb);
 }
 
 Json to_json(const LatencyMetrics& metrics) {

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
+#include <span>
 #include <vector>
 
 #include "tools/common/json.h"
@@ -33,14 +33,13 @@ struct SteadinessMetrics {
          end_mb = 0.0;  // resident after a tenth of the frames, half of them, all
 };
 
+// Thread CPU time of tracking, of those frames where it was measured alone.
+[[nodiscard]] std::vector<double> tracking_times_ms(std::span<const TimedFrame> frames);
 // Nothing in lockstep.
 [[nodiscard]] std::optional<LatencyMetrics> measure_latency(const std::vector<TimedFrame>& frames);
 // Nothing under 400 frames: a twentieth then has no 99th percentile to speak of.
 [[nodiscard]] std::optional<SteadinessMetrics> measure_steadiness(const std::vector<TimedFrame>& frames);
 
-// One line each, that begins with the run's name.
-[[nodiscard]] std::string latency_text(const std::string& name, const LatencyMetrics& metrics);
-[[nodiscard]] std::string steadiness_text(const std::string& name, const SteadinessMetrics& metrics);
 [[nodiscard]] Json to_json(const LatencyMetrics& metrics);
 [[nodiscard]] Json to_json(const SteadinessMetrics& metrics);
 

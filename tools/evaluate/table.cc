@@ -61,6 +61,21 @@ std::string segment_text(const SegmentScale& segment) {
   return text;
 }
 
+std::string latency_text(const LatencyMetrics& m) {
+  return "p50_ms=" + decimal(m.p50_ms, 2) + " p99_ms=" + decimal(m.p99_ms, 2) +
+         " max_ms=" + decimal(m.max_ms, 1) +
+         " beyond_tracking_p50_ms=" + decimal(m.beyond_tracking_p50_ms, 2) +
+         " beyond_tracking_p99_ms=" + decimal(m.beyond_tracking_p99_ms, 2) +
+         " frame_period_ms=" + decimal(m.frame_period_ms, 1) +
+         " later_than_a_frame=" + std::to_string(m.later_than_a_frame);
+}
+
+std::string steadiness_text(const SteadinessMetrics& m) {
+  return "tracking_p99_ms second twentieth " + decimal(m.second_twentieth_p99_ms, 2) + ", last " +
+         decimal(m.last_twentieth_p99_ms, 2) + "; resident_mb after a tenth " + decimal(m.tenth_mb, 1) +
+         ", half " + decimal(m.half_mb, 1) + ", all " + decimal(m.end_mb, 1);
+}
+
 std::string ate_text(const TrajectoryMetrics& metrics) {
   return metrics.absolute ? decimal(metrics.absolute->rmse_m, 4) : "lost";
 }
@@ -146,8 +161,9 @@ std::string details_text(const RunMetrics& metrics) {
     text += metrics.name + " maps: made=" + integer(metrics.maps) +
             " times_lost=" + integer(metrics.times_lost) + "\n";
   }
-  if (metrics.latency) text += latency_text(metrics.name, *metrics.latency);
-  if (metrics.steadiness) text += steadiness_text(metrics.name, *metrics.steadiness);
+  if (metrics.latency) text += metrics.name + " latency: " + latency_text(*metrics.latency) + "\n";
+  if (metrics.steadiness)
+    text += metrics.name + " steadiness: " + steadiness_text(*metrics.steadiness) + "\n";
   if (metrics.landmarks) text += landmarks_text(metrics.name, *metrics.landmarks);
   for (const SegmentScale& segment : metrics.segments)
     text += metrics.name + " " + segment_text(segment) + "\n";

@@ -27,7 +27,8 @@ std::string peak_memory(const RunRecord& run) {
 std::vector<std::string> row(const RunRecord& run) {
   const RunMetrics* m = run.metrics ? &*run.metrics : nullptr;
   const summary_t* s = run.summary();
-  const std::vector<double> tracking_ms = run.run.log ? run.run.log->tracking_ms : std::vector<double>{};
+  const std::vector<double> tracking_ms =
+      run.run.log ? tracking_times_ms(run.run.log->timed_frames) : std::vector<double>{};
   const auto depth = [&](auto&& figure) { return m && m->depth ? number(figure(*m->depth), 1) : kNone; };
   const auto rpe = [&](auto&& figure, int digits) {
     return m && m->final_metrics.segments ? number(figure(*m->final_metrics.segments), digits) : kNone;

@@ -10,6 +10,7 @@
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
+#include "tools/simulate/kept_log.h"
 #include "tools/simulate/measurements.h"
 #include "tools/simulate/stop_signals.h"
 
@@ -97,9 +98,8 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::string& file) {
 // Keeps what there is and says so.
 [[noreturn]] void give_up(const std::string& why, std::int64_t frames, const RecorderOptions& options,
                           ipc::LogWriter* log) {
-  const std::string kept = log->keep_incomplete();
   throw RunError(options.output + ": " + why + " after " + std::to_string(frames) + " frames" +
-                 (kept.empty() ? "" : "; the log so far is kept as " + kept));
+                 keep_incomplete(log));
 }
 
 }  // namespace

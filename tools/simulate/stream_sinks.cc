@@ -7,6 +7,7 @@
 
 #include "ipc/channels.h"
 #include "tools/common/errors.h"
+#include "tools/simulate/kept_log.h"
 
 namespace farpoint::tools::simulate {
 
@@ -82,7 +83,7 @@ LogSink::LogSink(std::string file) : file_(std::move(file)) {
 }
 
 LogSink::~LogSink() {
-  if (!ended_) (void)log_->keep_incomplete();
+  (void)LogSink::abandon();
 }
 
 template <typename Message>
@@ -117,8 +118,7 @@ bool LogSink::take_image(const image_t& message) {
 std::string LogSink::abandon() {
   if (ended_) return {};
   ended_ = true;
-  const std::string kept = log_->keep_incomplete();
-  return kept.empty() ? "" : "; the log so far is kept as " + kept;
+  return keep_incomplete(log_.get());
 }
 
 void LogSink::close() {

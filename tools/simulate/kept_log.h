@@ -1,0 +1,17 @@
+// What a run that ends early leaves of its log.
+#pragma once
+
+#include <string>
+
+#include "ipc/log.h"
+
+namespace farpoint::tools::simulate {
+
+// Keeps what there is as <file>.incomplete, and says so to go on in an error's message; empty where nothing
+// is kept.
+[[nodiscard]] inline std::string keep_incomplete(ipc::LogWriter* log) {
+  const std::string kept = log->keep_incomplete();
+  return kept.empty() ? "" : "; the log so far is kept as " + kept;
+}
+
+}  // namespace farpoint::tools::simulate
