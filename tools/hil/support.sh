@@ -1,12 +1,9 @@
-# What scenarios share. $left is the folder that the host reads afterwards; what must be quick is in /tmp.
+# What scenarios share. $left is the folder that the host reads afterwards. The machine's clock runs on, and fast, while
+# all wait for that folder; nothing else waits for the host. So what must be quick is in /tmp.
 daemon_log=/tmp/daemon.log
 control=/tmp/control
 began=$(date +%s)
 cd "$root" && cp -t /tmp farpointd farpoint play usb_camera stop_thread frames.grey camera.yaml
-# The machine's time jumps while it waits for its disk: libraries and tools are read before anything is timed.
-/tmp/farpointd --version > /dev/null
-/tmp/farpoint --help > /dev/null
-cat /usr/bin/candump /usr/bin/v4l2-ctl /usr/bin/journalctl /usr/bin/systemctl /usr/sbin/tc /usr/sbin/ip > /dev/null
 
 bring_back() { cp -t "$left" /tmp/figures /tmp/complaint $daemon_log 2> /dev/null; }
 trap bring_back EXIT
@@ -205,14 +202,8 @@ install_package() {
 }
 has_lcm_route() { ip route | grep -q 224.0.0.0/4; }
 
-# read_first FILE...: they and the libraries of those that are programs are in memory. The machine's time jumps, beyond
-# the patience of services, while it waits for its disk.
-read_first() { cat "$@" $(ldd "$@" 2> /dev/null | grep -o "/[^ :]*" | sort -u) > /dev/null 2>&1; }
-
 # The package, a loopback camera, and LCM's route, which a running networkd sets; the service is not started.
 install_service() {
-  read_first /lib/systemd/systemd-{networkd,udevd} /usr/bin/{dpkg,dpkg-deb,tar,networkctl,systemctl,udevadm} \
-    /usr/bin/systemd-{sysusers,tmpfiles} /usr/sbin/ip "$root/farpoint.deb"
   systemctl start systemd-networkd
   install_package /dev/video10
   wait_until 20 "LCM's route" has_lcm_route

@@ -8,8 +8,7 @@ from host import material
 
 QEMU = "qemu-system-x86_64"
 # The guest's clock counts instructions, 1 ns each, and skips what it sleeps: however busy this machine is, the guest
-# sees a processor of the same speed. Its time jumps while it waits for the disk, so what has a deadline is in memory
-# first.
+# sees a processor of the same speed.
 VIRTUAL_TIME = ["-icount", "shift=0,sleep=off"]
 SYSTEMD = "hil.init=/sbin/init systemd.wants=hil.service systemd.show_status=0"
 
@@ -24,15 +23,25 @@ def guest(here, packages):
     return pathlib.Path(done.stdout.strip())
 
 
+def disk(file):
+    """The guest's disk, as persistent memory: what the guest writes is gone with the machine.
+
+    The guest's clock runs on, and fast, while every process waits for something outside; for a disk of blocks, by as
+    much as this machine's own disk is slow. It stands still while the processor reads memory, however long that takes.
+    """
+    return ["-object", f"memory-backend-file,id=disk,mem-path={file},size={file.stat().st_size},share=off,reserve=off",
+            "-device", "nvdimm,memdev=disk"]
+
+
 def command(guest_folder, kind, devices, folder):
     kernel_line = "console=ttyS0 quiet panic=-1 mitigations=off no_timer_check "
     kernel_line += SYSTEMD if kind in ("systemd", "reboots") else ""
     end = [] if kind == "reboots" else ["-no-reboot"]
-    return [QEMU, "-machine", "q35", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
-            "-smp", "1", "-m", "2048", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
+    return [QEMU, "-machine", "q35,nvdimm=on", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
+            "-smp", "1", "-m", "2048,slots=1,maxmem=8G", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
             "-serial", "stdio", "-monitor", "none", *end,
             "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,
-            "-drive", f"file={guest_folder / 'root.ext4'},format=raw,if=virtio,snapshot=on",
+            *disk(guest_folder / "root.ext4"),
             "-virtfs", f"local,path={folder},mount_tag=share,security_model=none,multidevs=remap",
             "-device", "isa-debug-exit,iobase=0xf4,iosize=0x04", *devices.split()]
 
