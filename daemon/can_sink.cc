@@ -98,7 +98,7 @@ bool CanSink::tick(double now_s, wheels_t* wheels) {
     next_maintenance_s_ = now_s + kMaintainEvery_s;
     bus_->maintain();
   }
-  if (last_s_ > 0.0 && steady_period_s_ > 0.0 && now_s >= next_steady_s_) send_carried_on(now_s);
+  if (now_s >= next_due_s()) send_carried_on(now_s);
   ipc::CanFrame frame;
   std::int64_t age_us = 0;
   while (bus_->receive(&frame, &age_us)) {

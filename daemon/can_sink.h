@@ -1,6 +1,7 @@
 // Odometry onto the bus and into a CAN log: one epoch of frames for every camera frame.
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "daemon/config.h"
@@ -26,7 +27,8 @@ class CanSink final : public PoseSink {
   void read_wheels(std::unique_ptr<drivers::WheelReader> wheels) { wheels_ = std::move(wheels); }
 
   void on_frame(const FrameOutput& frame) override;
-  [[nodiscard]] bool is_steady() const { return steady_period_s_ > 0.0; }
+  // When tick() has to send next; never: infinity.
+  [[nodiscard]] double next_due_s() const { return is_carried_on() ? next_steady_s_ : kNever_s; }
   // Live, often: sends what is due, looks for a bus that is away, and reads what has come. True where *wheels
   // was filled; ask again then.
   [[nodiscard]] bool tick(double now_s, wheels_t* wheels);
@@ -41,6 +43,10 @@ class CanSink final : public PoseSink {
   void close();
 
  private:
+  static constexpr double kNever_s = std::numeric_limits<double>::infinity();
+  // Odometry goes on between the images, once there was one.
+  [[nodiscard]] bool is_carried_on() const { return bus_ && steady_period_s_ > 0.0 && last_s_ > 0.0; }
+
   CanPoseFrame pose_frame_;
   ipc::CanEncoder encoder_;
   std::unique_ptr<ipc::CandumpWriter> log_;

@@ -1,6 +1,7 @@
 // Everything that a run writes or sends. Files appear when close() is called, else not at all.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,8 +31,10 @@ class Outputs {
   [[nodiscard]] OutputCounts counts() const;
   // Live, on the output's thread, between the frames.
   void tick(double now_s);
-  // Whether tick() is wanted more often than images come.
-  [[nodiscard]] bool is_steady() const { return can_ && can_->is_steady(); }
+  // When tick() has to send something next; never: infinity.
+  [[nodiscard]] double next_due_s() const {
+    return can_ ? can_->next_due_s() : std::numeric_limits<double>::infinity();
+  }
 
   // Puts every file in its place; returns their names. Throws std::runtime_error where something was not
   // stored. Warns of what was not sent.

@@ -14,9 +14,8 @@ namespace {
 
 // How often output looks for a frame that is being tracked: what it may add to the frame's age.
 constexpr std::int64_t kLookEvery_us = 200;
-// With a camera, output looks whether it has fallen silent and what has come from the bus; more often where
-// it has to send between the images.
-constexpr std::int64_t kIdleLooksEvery_us = 20'000, kSteadyLooksEvery_us = 1'000;
+// With a camera, output looks whether it has fallen silent and what has come from the bus.
+constexpr std::int64_t kIdleLooksEvery_us = 20'000;
 // Output wakes mapping; should output be held up by a disk, mapping looks for itself.
 constexpr std::int64_t kMappingLooksEvery_us = 10'000;
 constexpr std::int64_t kWatchEvery_us = 20'000;
@@ -181,6 +180,13 @@ bool Pipeline::frames_in_work() const {
   return images_.pushed() > images_.dropped() + tracked;
 }
 
+// How long output may wait while no frame is in work.
+std::int64_t Pipeline::idle_us() const {
+  if (!is_live()) return Notifier::kNoLimit;
+  const double due_us = std::ceil(1e6 * (outputs_.next_due_s() - steady_s()));
+  return static_cast<std::int64_t>(std::clamp(due_us, 0.0, static_cast<double>(kIdleLooksEvery_us)));
+}
+
 void Pipeline::output() {
   for (;;) {
     const std::uint32_t seen = arrived_.seen();
@@ -194,9 +200,7 @@ void Pipeline::output() {
       break;
     } else {
       report_silence_if_due();
-      const std::int64_t live_us = outputs_.is_steady() ? kSteadyLooksEvery_us : kIdleLooksEvery_us;
-      const std::int64_t idle_us = is_live() ? live_us : Notifier::kNoLimit;
-      arrived_.wait(seen, in_work ? kLookEvery_us : idle_us);
+      arrived_.wait(seen, in_work ? kLookEvery_us : idle_us());
     }
   }
   output_ended_.store(true, std::memory_order_release);

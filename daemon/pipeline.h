@@ -87,6 +87,7 @@ class Pipeline {
   void track_one(CapturedImage* image);
   void map();
   void output();
+  [[nodiscard]] std::int64_t idle_us() const;
   void report_one(FramePackage* package);
   void report_silence_if_due();
   void watch();

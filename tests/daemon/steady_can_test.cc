@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <thread>
 
@@ -75,6 +76,27 @@ TEST_F(SteadyCan, BetweenTwoImagesAtTheRateWithGrowingAgeAndSigma) {
   }
   EXPECT_GT(sent.back().at("FARPOINT_POSITION_SIGMA.SigmaPositionX"),
             sent.front().at("FARPOINT_POSITION_SIGMA.SigmaPositionX"));
+}
+
+TEST_F(SteadyCan, IsDueAPeriodAfterTheImageAndThenEveryPeriod) {
+  EXPECT_EQ(sink_.next_due_s(), std::numeric_limits<double>::infinity());  // nothing to carry on yet
+  frame_.age_at_s = steady_s();
+  sink_.on_frame(frame_);
+  EXPECT_DOUBLE_EQ(sink_.next_due_s(), frame_.age_at_s + 0.020);
+  EXPECT_FALSE(sink_.tick(frame_.age_at_s + 0.0199, &wheels_));
+  EXPECT_EQ(epochs().size(), 1U);
+  // Looked at a little late, it does not drift.
+  EXPECT_FALSE(sink_.tick(frame_.age_at_s + 0.0205, &wheels_));
+  EXPECT_EQ(epochs().size(), 2U);
+  EXPECT_DOUBLE_EQ(sink_.next_due_s(), frame_.age_at_s + 0.040);
+}
+
+TEST_F(SteadyCan, WithoutARateNothingIsDue) {
+  sink_.send_steadily(0.0, 0.1);
+  sink_.on_frame(frame_);
+  EXPECT_EQ(sink_.next_due_s(), std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(sink_.tick(steady_s() + 1.0, &wheels_));
+  EXPECT_EQ(epochs().size(), 1U);
 }
 
 TEST_F(SteadyCan, TimeThatSendingTookIsInTheAge) {
