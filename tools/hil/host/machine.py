@@ -38,8 +38,8 @@ def command(guest_folder, kind, devices, folder):
     kernel_line += SYSTEMD if kind in ("systemd", "reboots") else ""
     end = [] if kind == "reboots" else ["-no-reboot"]
     return [QEMU, "-machine", "q35,nvdimm=on", "-accel", "tcg,thread=single", *VIRTUAL_TIME, "-cpu", "max",
-            "-smp", "1", "-m", "2048,slots=1,maxmem=8G", "-nodefaults", "-vga", "none", "-nic", "none", "-display", "none",
-            "-serial", "stdio", "-monitor", "none", *end,
+            "-smp", "1", "-m", "2048,slots=1,maxmem=8G", "-nodefaults", "-vga", "none", "-nic", "none",
+            "-display", "none", "-serial", "stdio", "-monitor", "none", *end,
             "-kernel", guest_folder / "vmlinuz", "-initrd", guest_folder / "initrd.gz", "-append", kernel_line,
             *disk(guest_folder / "root.ext4"),
             "-virtfs", f"local,path={folder},mount_tag=share,security_model=none,multidevs=remap",
