@@ -73,10 +73,10 @@ void CanSink::on_frame(const FrameOutput& frame) {
   const double age_s = 1e-6 * static_cast<double>(frame.age_us);
   const ipc::CanEpoch frames = encoder_.encode(make_epoch(frame, pose_frame_, age_s));
   if (bus_) bus_->send(frames);
-  if (steady_period_s_ > 0.0) {
+  if (bus_ && steady_period_s_ > 0.0) {
     last_ = frame;
     last_s_ = frame.age_at_s > 0.0 ? frame.age_at_s : steady_s();
-    next_steady_s_ = last_s_ + steady_period_s_;
+    next_due_s_ = last_s_ + steady_period_s_;
   }
   if (!log_) return;
   if (frame.result.utime >= 0) {
@@ -98,7 +98,7 @@ bool CanSink::tick(double now_s, wheels_t* wheels) {
     next_maintenance_s_ = now_s + kMaintainEvery_s;
     bus_->maintain();
   }
-  if (now_s >= next_due_s()) send_carried_on(now_s);
+  if (now_s >= next_due_s_) send_carried_on(now_s);
   ipc::CanFrame frame;
   std::int64_t age_us = 0;
   while (bus_->receive(&frame, &age_us)) {
@@ -113,7 +113,7 @@ void CanSink::send_carried_on(double now_s) {
   // Longer than this nobody knows where the body went: its age alone goes on.
   constexpr double kLongest_s = 0.25;
   // From tick to tick, and not late for ever where one came late.
-  next_steady_s_ = std::max(next_steady_s_ + steady_period_s_, now_s);
+  next_due_s_ = std::max(next_due_s_ + steady_period_s_, now_s);
   const double dt_s = now_s - last_s_;
   FrameOutput frame = extrapolate(last_, dt_s, frame_period_s_);
   if (dt_s > kLongest_s) frame.valid = false;

@@ -27,8 +27,9 @@ class CanSink final : public PoseSink {
   void read_wheels(std::unique_ptr<drivers::WheelReader> wheels) { wheels_ = std::move(wheels); }
 
   void on_frame(const FrameOutput& frame) override;
-  // When tick() has to send next; never: infinity.
-  [[nodiscard]] double next_due_s() const { return is_carried_on() ? next_steady_s_ : kNever_s; }
+  static constexpr double kNever_s = std::numeric_limits<double>::infinity();
+  // When tick() has to send next.
+  [[nodiscard]] double next_due_s() const { return next_due_s_; }
   // Live, often: sends what is due, looks for a bus that is away, and reads what has come. True where *wheels
   // was filled; ask again then.
   [[nodiscard]] bool tick(double now_s, wheels_t* wheels);
@@ -43,10 +44,6 @@ class CanSink final : public PoseSink {
   void close();
 
  private:
-  static constexpr double kNever_s = std::numeric_limits<double>::infinity();
-  // Odometry goes on between the images, once there was one.
-  [[nodiscard]] bool is_carried_on() const { return bus_ && steady_period_s_ > 0.0 && last_s_ > 0.0; }
-
   CanPoseFrame pose_frame_;
   ipc::CanEncoder encoder_;
   std::unique_ptr<ipc::CandumpWriter> log_;
@@ -57,7 +54,8 @@ class CanSink final : public PoseSink {
   std::unique_ptr<drivers::WheelReader> wheels_;
   double steady_period_s_ = 0, frame_period_s_ = 0;
   FrameOutput last_;  // sent with an image
-  double last_s_ = 0, next_steady_s_ = 0, next_maintenance_s_ = 0;
+  double last_s_ = 0, next_maintenance_s_ = 0;
+  double next_due_s_ = kNever_s;  // there is nothing to carry on before the first image
 };
 
 }  // namespace farpoint::daemon

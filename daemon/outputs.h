@@ -1,7 +1,6 @@
 // Everything that a run writes or sends. Files appear when close() is called, else not at all.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,10 +30,8 @@ class Outputs {
   [[nodiscard]] OutputCounts counts() const;
   // Live, on the output's thread, between the frames.
   void tick(double now_s);
-  // When tick() has to send something next; never: infinity.
-  [[nodiscard]] double next_due_s() const {
-    return can_ ? can_->next_due_s() : std::numeric_limits<double>::infinity();
-  }
+  // When tick() has to send something next.
+  [[nodiscard]] double next_due_s() const { return can_ ? can_->next_due_s() : CanSink::kNever_s; }
 
   // Puts every file in its place; returns their names. Throws std::runtime_error where something was not
   // stored. Warns of what was not sent.
