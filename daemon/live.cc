@@ -7,19 +7,19 @@
 #include <cstring>
 #include <optional>
 
-#include "daemon/build_info.h"
-#include "daemon/camera_driver.h"
-#include "daemon/camera_file.h"
-#include "daemon/camera_source.h"
-#include "daemon/control_socket.h"
-#include "daemon/last_line.h"
-#include "daemon/logging.h"
-#include "daemon/outputs.h"
-#include "daemon/recorder.h"
-#include "daemon/second_camera.h"
-#include "daemon/service_manager.h"
-#include "daemon/session.h"
-#include "daemon/stop_signal.h"
+#include "daemon/config/build_info.h"
+#include "daemon/config/camera_file.h"
+#include "daemon/input/camera_driver.h"
+#include "daemon/input/camera_source.h"
+#include "daemon/input/recorder.h"
+#include "daemon/input/second_camera.h"
+#include "daemon/output/outputs.h"
+#include "daemon/output/run_summary.h"
+#include "daemon/pipeline/session.h"
+#include "daemon/system/control_socket.h"
+#include "daemon/system/logging.h"
+#include "daemon/system/service_manager.h"
+#include "daemon/system/stop_signal.h"
 
 namespace farpoint::daemon {
 namespace {

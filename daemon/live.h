@@ -4,10 +4,10 @@
 #include <functional>
 #include <memory>
 
-#include "daemon/config.h"
-#include "daemon/options.h"
-#include "daemon/pipeline.h"
-#include "drivers/camera.h"
+#include "daemon/config/config.h"
+#include "daemon/config/options.h"
+#include "daemon/pipeline/pipeline.h"
+#include "drivers/camera/camera.h"
 
 namespace farpoint::daemon {
 

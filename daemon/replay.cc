@@ -8,17 +8,17 @@
 #include <stdexcept>
 #include <string>
 
-#include "daemon/build_info.h"
-#include "daemon/errors.h"
-#include "daemon/last_line.h"
-#include "daemon/log_frame_source.h"
-#include "daemon/logging.h"
-#include "daemon/outputs.h"
-#include "daemon/paced_source.h"
-#include "daemon/pipeline.h"
-#include "daemon/schedule.h"
-#include "daemon/session.h"
-#include "daemon/stop_signal.h"
+#include "daemon/config/build_info.h"
+#include "daemon/config/errors.h"
+#include "daemon/input/log_frame_source.h"
+#include "daemon/input/paced_source.h"
+#include "daemon/output/outputs.h"
+#include "daemon/output/run_summary.h"
+#include "daemon/pipeline/pipeline.h"
+#include "daemon/pipeline/schedule.h"
+#include "daemon/pipeline/session.h"
+#include "daemon/system/logging.h"
+#include "daemon/system/stop_signal.h"
 
 namespace farpoint::daemon {
 namespace {

@@ -1,9 +1,9 @@
 // Replay of a recorded log: in lockstep, with threads at a pace, or as a threaded run was recorded.
 #pragma once
 
-#include "daemon/config.h"
-#include "daemon/options.h"
-#include "daemon/pipeline.h"
+#include "daemon/config/config.h"
+#include "daemon/config/options.h"
+#include "daemon/pipeline/pipeline.h"
 
 namespace farpoint::daemon {
 

@@ -5,13 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "daemon/config.h"
+#include "daemon/config/config.h"
+#include "daemon/config/options.h"
+#include "daemon/config/rig.h"
 #include "daemon/live.h"
-#include "daemon/logging.h"
-#include "daemon/options.h"
 #include "daemon/replay.h"
-#include "daemon/rig.h"
-#include "daemon/service_log.h"
+#include "daemon/system/logging.h"
+#include "daemon/system/service_log.h"
 
 namespace farpoint::daemon {
 namespace {

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "slam/back_end.h"
 #include "slam/exchange.h"
-#include "slam/mapping_side.h"
-#include "slam/tracking_side.h"
+#include "slam/front_end.h"
 
 namespace farpoint::slam {
 

@@ -1,7 +1,7 @@
 // The facade of the estimator: frames in, poses out. No I/O, no threads, no clock, no logging, no globals.
 //
-// Two halves that share nothing but fixed rings: tracking (slam/tracking_side.h) and mapping
-// (slam/mapping_side.h). Who runs them is the caller's choice:
+// Two halves that share nothing but fixed rings: tracking (slam/front_end.h) and mapping
+// (slam/back_end.h). Who runs them is the caller's choice:
 //   lockstep  process() tracks one frame, runs the mapping jobs it asked for, and takes their results a
 //             configured number of frames later, as a real-time run would;
 //   threads   track() on one thread, map() on another; a frame takes what mapping has ready;

@@ -13,7 +13,7 @@
 #include "slam/config.h"
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
-#include "slam/mapping/statistics.h"
+#include "slam/mapping/counts.h"
 #include "slam/spsc_ring.h"
 
 namespace farpoint::slam {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "slam/mapping/schur_blocks.h"
+#include "slam/solver/schur_blocks.h"
 
 namespace farpoint::slam {
 

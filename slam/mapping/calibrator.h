@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "slam/config.h"
-#include "slam/mapping/bundle_problem.h"
+#include "slam/solver/bundle_problem.h"
 
 namespace farpoint::slam {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "slam/map/map.h"
-#include "slam/mapping/statistics.h"
+#include "slam/mapping/counts.h"
 
 namespace farpoint::slam {
 

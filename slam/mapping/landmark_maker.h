@@ -7,8 +7,8 @@
 
 #include "slam/config.h"
 #include "slam/map/map.h"
+#include "slam/mapping/counts.h"
 #include "slam/mapping/epipolar_index.h"
-#include "slam/mapping/statistics.h"
 
 namespace farpoint::slam {
 

@@ -13,13 +13,13 @@
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
 #include "slam/map/shared_pool.h"
-#include "slam/mapping/bundle_problem.h"
 #include "slam/mapping/calibrator.h"
+#include "slam/mapping/counts.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/measurement.h"
-#include "slam/mapping/schur_solver.h"
 #include "slam/mapping/soundness.h"
-#include "slam/mapping/statistics.h"
+#include "slam/solver/bundle_problem.h"
+#include "slam/solver/schur_solver.h"
 #include "slam/stages.h"
 
 namespace farpoint::slam {

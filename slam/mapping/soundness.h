@@ -3,7 +3,7 @@
 // a scene that moves.
 #pragma once
 
-#include "slam/mapping/bundle_problem.h"
+#include "slam/solver/bundle_problem.h"
 
 namespace farpoint::slam {
 

@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "slam/tracking/pose_solver.h"
-#include "tests/mapping/bundle_scene.h"
+#include "tests/solver/bundle_scene.h"
 
 namespace farpoint::slam {
 namespace {

@@ -10,7 +10,7 @@
 #include <random>
 #include <set>
 
-#include "daemon/config.h"
+#include "daemon/config/config.h"
 #include "tests/daemon/run_daemon.h"
 #include "tests/daemon/synthetic_log.h"
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "daemon/live.h"
-#include "daemon/stage_clock.h"
+#include "daemon/system/stage_clock.h"
 #include "tests/daemon/synthetic_log.h"
 #include "tests/ipc/scratch.h"
 

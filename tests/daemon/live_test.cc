@@ -15,7 +15,7 @@
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tests/daemon/live_fixture.h"
-#include "tests/daemon/notify_socket.h"
+#include "tests/daemon/system/notify_socket.h"
 #include "tests/ipc/log_events.h"
 
 namespace farpoint::daemon {

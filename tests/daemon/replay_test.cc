@@ -19,6 +19,7 @@
 #include "tests/daemon/synthetic_log.h"
 #include "tests/ipc/dbc.h"
 #include "tests/ipc/scratch.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -289,10 +290,9 @@ TEST_F(SyntheticRun, EveryEventOfTheOutputHasAFramesTime) {
 
 TEST_F(SyntheticRun, StandardInputGivesTheSame) {
   ASSERT_EQ(run_daemon({"--replay", log_path(), "--lockstep", "--output", path("file.lcm")}).status, 0);
-  const std::string command =
-      std::string(FARPOINT_BINARY_DIR
-                  "/bin/farpointd --replay - --lockstep --set log.level=warning --output ") +
-      path("stdin.lcm") + " < " + log_path() + " > /dev/null 2>&1";
+  const std::string command = test::binary_dir() +
+                              "/bin/farpointd --replay - --lockstep --set log.level=warning --output " +
+                              path("stdin.lcm") + " < " + log_path() + " > /dev/null 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   expect_same(comparable(path("stdin.lcm")), comparable(path("file.lcm")), "output log");
 }
@@ -305,7 +305,7 @@ TEST_F(SyntheticRun, ASignalEndsItInOrder) {
   const std::string most = std::to_string(bytes - bytes / 61);
   const std::string fifo = path("stopped.fifo"), log = log_path();
   const std::string command =
-      "mkfifo " + fifo + "; " FARPOINT_BINARY_DIR "/bin/farpointd --replay - --lockstep --output " +
+      "mkfifo " + fifo + "; " + test::binary_dir() + "/bin/farpointd --replay - --lockstep --output " +
       path("stopped.lcm") + " --trajectory " + path("stopped.tum") + " < " + fifo + " > /dev/null 2> " +
       path("stopped.err") + " & { head -c " + most + " " + log + "; kill -TERM $!; tail -c +" + most + " " +
       log + " | tail -c +2; } > " + fifo + " 2> /dev/null; wait $!";
@@ -417,7 +417,7 @@ pid_t start_busy_loop() {
 // FARPOINT_TIMING.
 void expect_repeatable(const test::Scratch& scratch, const std::string& log) {
   const auto command = [&](const std::string& name) {
-    return FARPOINT_BINARY_DIR "/bin/farpointd --replay " + log +
+    return test::binary_dir() + "/bin/farpointd --replay " + log +
            " --lockstep --set scale.assumed=1 --output " + scratch.path(name + ".lcm") + " --trajectory " +
            scratch.path(name + ".final.tum") + " --live-trajectory " + scratch.path(name + ".live.tum") +
            " --can-log " + scratch.path(name + ".candump") + " > /dev/null 2>&1";
@@ -446,7 +446,7 @@ TEST(Determinism, SyntheticLog) {
   expect_repeatable(scratch, scratch.path("run.lcm"));
 }
 
-const std::string kKitti03 = FARPOINT_SOURCE_DIR "/../shared/data/kitti/sequences/03";
+const std::string kKitti03 = test::source_dir() + "/../shared/data/kitti/sequences/03";
 
 TEST(Determinism, RecordedDrive) {
   const test::Scratch scratch;
@@ -459,7 +459,7 @@ TEST(Determinism, RecordedDrive) {
 
 using Epoch = std::map<std::string, double>;
 std::map<std::int64_t, Epoch> decode_can_log(const std::string& path) {
-  const auto dbc = test::read_dbc(FARPOINT_SOURCE_DIR "/config/farpoint.dbc");
+  const auto dbc = test::read_dbc(test::source_dir() + "/config/farpoint.dbc");
   std::map<std::int64_t, Epoch> epochs;
   std::ifstream in(path);
   for (std::string line; std::getline(in, line);) {

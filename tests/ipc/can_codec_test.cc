@@ -15,6 +15,7 @@
 #include "ipc/candump.h"
 #include "tests/ipc/dbc.h"
 #include "tests/ipc/scratch.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::ipc {
 namespace {
@@ -25,7 +26,7 @@ using test::DbcSignal;
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-const std::string kDbcPath = std::string(FARPOINT_SOURCE_DIR) + "/config/farpoint.dbc";
+const std::string kDbcPath = test::source_dir() + "/config/farpoint.dbc";
 
 const std::map<std::uint32_t, DbcMessage>& dbc() {
   static const auto messages = test::read_dbc(kDbcPath);
@@ -348,8 +349,8 @@ TEST(CanCodec, AnIndependentDecoderGivesEverySignalBack) {
     writer.write(1000 * i, encoder.encode(epochs.back()));
   }
   writer.close();
-  const std::string command = std::string(FARPOINT_SOURCE_DIR) + "/tests/ipc/candied/decode " + kDbcPath +
-                              " " + scratch.path("a.candump") + " > " + scratch.path("a.csv");
+  const std::string command = test::source_dir() + "/tests/ipc/candied/decode " + kDbcPath + " " +
+                              scratch.path("a.candump") + " > " + scratch.path("a.csv");
   const int status = std::system(command.c_str());
   if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no node or npm on this machine";
   ASSERT_EQ(status, 0) << command;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/ipc/scratch.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::ipc {
 namespace {
@@ -199,7 +200,7 @@ TEST_F(DbcText, MistakesAreNamed) {
 // The shipped file describes our own frames: its signals can be read too.
 TEST(DbcShipped, IsRead) {
   const DbcSignal age =
-      read_dbc_signal(std::string(FARPOINT_SOURCE_DIR) + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");
+      read_dbc_signal(test::source_dir() + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");
   EXPECT_EQ(age.id, 0x300U);
 }
 

@@ -18,6 +18,7 @@
 #include "ipc/message.h"
 #include "tests/ipc/allocations.h"
 #include "tests/ipc/scratch.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::ipc {
 namespace {
@@ -204,8 +205,8 @@ constexpr const char* kSelfTest = "LCM_SELF_TEST";
 
 TEST(LcmPublisher, LcmLoggerRecordsAndAStrangerDecodesEveryMessage) {
   const test::Scratch scratch;
-  const std::string folder = std::string(FARPOINT_SOURCE_DIR) + "/tests/ipc/udp";
-  const std::string runner = folder + "/run " + FARPOINT_SOURCE_DIR + "/ipc/types " + scratch.path("");
+  const std::string folder = test::source_dir() + "/tests/ipc/udp";
+  const std::string runner = folder + "/run " + test::source_dir() + "/ipc/types " + scratch.path("");
   const int status =
       run_in_namespace(scratch.path(""), "LcmPublisherInNamespace.DISABLED_PublishesEverything", runner);
   if (status == kSkipped) GTEST_SKIP() << "no permission for a network namespace (unshare -n)";

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 #include <sstream>
+#include "tests/support/paths.h"
 
 namespace farpoint::ipc {
 namespace {
@@ -47,7 +48,7 @@ std::vector<std::string> tokens(const std::string& text) {
 }
 
 std::vector<Member> members(const std::string& type) {
-  std::ifstream file(std::string(FARPOINT_SOURCE_DIR) + "/ipc/types/" + type + ".lcm");
+  std::ifstream file(test::source_dir() + "/ipc/types/" + type + ".lcm");
   EXPECT_TRUE(file) << type;
   const std::vector<std::string> words = tokens(without_comments(file));
   std::size_t at = 0;

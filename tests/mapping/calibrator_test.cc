@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/mapping/bundle_scene.h"
+#include "tests/solver/bundle_scene.h"
 
 namespace farpoint::slam {
 namespace {

@@ -5,8 +5,8 @@
 #include <functional>
 #include <limits>
 
-#include "slam/mapping/schur_solver.h"
-#include "tests/mapping/bundle_scene.h"
+#include "slam/solver/schur_solver.h"
+#include "tests/solver/bundle_scene.h"
 
 namespace farpoint::slam {
 namespace {

@@ -11,10 +11,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/config.h"
-#include "daemon/log_frame_source.h"
-#include "daemon/rig.h"
-#include "slam/geometry/alignment.h"
+#include "daemon/config/config.h"
+#include "daemon/config/rig.h"
+#include "daemon/input/log_frame_source.h"
+#include "slam/geometry/point_alignment.h"
 #include "tools/evaluate/log_input.h"
 
 namespace farpoint::test {

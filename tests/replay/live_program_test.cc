@@ -5,6 +5,7 @@
 
 #include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::test {
 namespace {
@@ -15,8 +16,8 @@ TEST(LiveProgram, WaitsForACameraThatIsNotThereAndStopsWhenItIsTold) {
   const std::string start =
       (kBin / "farpointd").string() +
       " --set camera.device=/dev/video-none --set control.socket=none --set lcm.enabled=false "
-      "--set camera.calibration=" FARPOINT_SOURCE_DIR "/config/cameras/tum-freiburg1.yaml > " +
-      said + " 2>&1 & daemon=$!; ";
+      "--set camera.calibration=" +
+      test::source_dir() + "/config/cameras/tum-freiburg1.yaml > " + said + " 2>&1 & daemon=$!; ";
   // Until it says so, at most half a minute; then it is told.
   const std::string wait = "for i in $(seq 300); do grep -q 'starting -> no_camera' " + said +
                            " && break; sleep 0.1; done; kill -TERM $daemon; wait $daemon";

@@ -10,6 +10,7 @@
 
 #include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::test {
 namespace {
@@ -26,7 +27,7 @@ struct Recording {
 };
 
 const std::string kTumImport =
-    "tum {}/tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR "/config/cameras/tum-freiburg1.yaml";
+    "tum {}/tum/freiburg1_rpy_part --camera " + test::source_dir() + "/config/cameras/tum-freiburg1.yaml";
 
 class RecordedAccuracy : public testing::TestWithParam<Recording> {};
 

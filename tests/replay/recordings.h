@@ -4,12 +4,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include "tests/support/paths.h"
 
 namespace farpoint::test {
 
 inline const std::filesystem::path kData =
-    std::filesystem::path(FARPOINT_SOURCE_DIR) / ".." / "shared" / "data";
-inline const std::filesystem::path kBin = std::filesystem::path(FARPOINT_BINARY_DIR) / "bin";
+    std::filesystem::path(test::source_dir()) / ".." / "shared" / "data";
+inline const std::filesystem::path kBin = std::filesystem::path(test::binary_dir()) / "bin";
 
 // Status of a shell command; what it prints goes to this test's output.
 inline int run(const std::string& command) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tests/simulate/small_worlds.h"
-#include "tools/simulate/motion_sensors.h"
+#include "tools/simulate/sensors/motion_sensors.h"
 
 namespace farpoint::tools::simulate {
 namespace {

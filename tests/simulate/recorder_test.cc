@@ -7,9 +7,10 @@
 #include "ipc/image_codec.h"
 #include "ipc/log.h"
 #include "tests/simulate/small_worlds.h"
+#include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
-#include "tools/simulate/recorder.h"
+#include "tools/simulate/stream/recorder.h"
 
 namespace farpoint::tools::simulate {
 namespace {
@@ -113,8 +114,7 @@ TEST(Recorder, WritesMjpegOfTheSamePicture) {
 }
 
 std::string simulate_command(const fs::path& output, const std::string& rest = "") {
-  return std::string(FARPOINT_BINARY_DIR) + "/bin/farpoint simulate town --size 160x64 -o " +
-         output.string() + " " + rest;
+  return test::binary_dir() + "/bin/farpoint simulate town --size 160x64 -o " + output.string() + " " + rest;
 }
 
 TEST(SimulateProgram, AFullDiskIsAnErrorThatNamesTheLogAndKeepsWhatWasWritten) {
@@ -181,8 +181,8 @@ TEST(SimulateProgram, AKilledRunLeavesALogThatReplays) {
   ASSERT_EQ(logs.size(), 1U);
   EXPECT_TRUE(logs[0].filename().string().starts_with("run.lcm.part")) << logs[0];
   EXPECT_GE(events_of(logs[0]).at("CAMERA_0"), 3);
-  const ProgramResult replay = run_shell(std::string(FARPOINT_BINARY_DIR) + "/bin/farpointd --replay " +
-                                         logs[0].string() + " --lockstep");
+  const ProgramResult replay =
+      run_shell(test::binary_dir() + "/bin/farpointd --replay " + logs[0].string() + " --lockstep");
   EXPECT_EQ(replay.status, kExitDone) << replay.err;
 }
 
@@ -206,7 +206,7 @@ TEST(SimulateProgram, WrongUseIsOneLineAndStatus2) {
 
 TEST(SimulateProgram, TakesACameraFile) {
   const ScratchFolder folder;
-  const std::string camera = std::string(FARPOINT_SOURCE_DIR) + "/config/cameras/tum-freiburg1.yaml";
+  const std::string camera = test::source_dir() + "/config/cameras/tum-freiburg1.yaml";
   const ProgramResult result = run_farpoint_program("simulate yard --duration 0.2 --camera " + camera +
                                                     " -o " + (folder / "run.lcm").string());
   EXPECT_EQ(result.status, kExitDone) << result.err;

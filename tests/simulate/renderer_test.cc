@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "tools/simulate/camera_sensor.h"
-#include "tools/simulate/noise.h"
-#include "tools/simulate/renderer.h"
-#include "tools/simulate/span_kernels.h"
+#include "tools/simulate/render/renderer.h"
+#include "tools/simulate/render/span_kernels.h"
+#include "tools/simulate/sensors/camera_sensor.h"
+#include "tools/simulate/world/noise.h"
 
 namespace farpoint::tools::simulate {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "ipc/channels.h"
 #include "ipc/log.h"
+#include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
 #include "tools/evaluate/log_input.h"
@@ -102,7 +103,7 @@ class ReportOfARun : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = new ScratchFolder;
-    const std::string bin = std::string(FARPOINT_BINARY_DIR) + "/bin/";
+    const std::string bin = test::binary_dir() + "/bin/";
     const std::string drive = (*folder / "drive.lcm").string(), out = (*folder / "vmp.lcm").string();
     std::string script = bin + "farpoint simulate town --size 620x188 --duration 9 -o " + drive;
     script +=

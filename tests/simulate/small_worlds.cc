@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/paths.h"
 #include "tools/common/text_file.h"
-#include "tools/simulate/world_file.h"
+#include "tools/simulate/world/world_file.h"
 
 namespace farpoint::tools::simulate {
 
@@ -11,7 +12,7 @@ SimulationRequest request_for(const std::string& world, int width_px, int height
                               const std::vector<Change>& changes) {
   SimulationRequest request;
   request.world_name = world;
-  request.world_file = std::string(FARPOINT_SOURCE_DIR) + "/config/worlds/" + world + ".yaml";
+  request.world_file = test::source_dir() + "/config/worlds/" + world + ".yaml";
   request.world_text = read_file(request.world_file);
   for (const Change& change : changes) {
     const std::size_t at =

@@ -15,18 +15,19 @@
 #include <stdexcept>
 #include <thread>
 
-#include "drivers/wheel_reader.h"
+#include "drivers/can/wheel_reader.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tests/simulate/small_worlds.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
-#include "tools/simulate/measurements.h"
-#include "tools/simulate/recorder.h"
-#include "tools/simulate/stream.h"
+#include "tools/simulate/sensors/measurements.h"
+#include "tools/simulate/stream/recorder.h"
+#include "tools/simulate/stream/stream.h"
 
 #ifdef FARPOINT_WITH_V4L2
-#include "tests/drivers/fake_v4l2_output.h"
+#include "tests/drivers/v4l2/fake_v4l2_output.h"
+#include "tests/support/paths.h"
 #endif
 
 namespace farpoint::tools::simulate {
@@ -422,7 +423,7 @@ TEST(StreamProgram, ASignalEndsItInOrder) {
   const ScratchFolder folder;
   const std::string log = (folder / "run.lcm").string(), out = (folder / "out").string();
   const ProgramResult result =
-      run_shell(std::string(FARPOINT_BINARY_DIR) +
+      run_shell(test::binary_dir() +
                 "/bin/farpoint simulate yard --size 64x48 --duration 600 --stream --lcm-url "
                 "'file://" +
                 (folder / "lcm.log").string() + "?mode=w' -o " + log + " > " + out +

@@ -3,16 +3,17 @@
 
 #include <filesystem>
 
+#include "tests/support/paths.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
-#include "tools/simulate/world_file.h"
+#include "tools/simulate/world/world_file.h"
 
 namespace farpoint::tools::simulate {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kWorlds = fs::path(FARPOINT_SOURCE_DIR) / "config" / "worlds";
+const fs::path kWorlds = fs::path(test::source_dir()) / "config" / "worlds";
 
 TEST(WorldFile, ShippedWorldsAreRight) {
   int count = 0;

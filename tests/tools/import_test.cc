@@ -3,8 +3,9 @@
 
 #include <functional>
 
-#include "daemon/camera_file.h"
+#include "daemon/config/camera_file.h"
 #include "ipc/log.h"
+#include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
 #include "tools/import/euroc.h"
@@ -421,7 +422,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(CameraFile, ShippedOnesAreGood) {
   int files = 0;
-  for (const auto& entry : fs::directory_iterator(fs::path(FARPOINT_SOURCE_DIR) / "config/cameras")) {
+  for (const auto& entry : fs::directory_iterator(fs::path(test::source_dir()) / "config/cameras")) {
     if (entry.path().extension() != ".yaml") continue;
     ++files;
     const daemon::CameraFile camera = daemon::read_camera_file(entry.path());

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 
 namespace farpoint::tools {
@@ -224,8 +225,8 @@ TEST_P(RealImport, ExportedTruthIsTheIndependentOne) {
   const ScratchFolder folder;
   const RealRecording& real = GetParam();
   const std::string log = quoted(folder / "run.lcm"), exported = quoted(folder / "truth.tum");
-  const std::string command = "cd " + quoted(shared_folder() / "data") +
-                              " && " FARPOINT_BINARY_DIR "/bin/farpoint import " + real.arguments;
+  const std::string command = "cd " + quoted(shared_folder() / "data") + " && " + test::binary_dir() +
+                              "/bin/farpoint import " + real.arguments;
   const ProgramResult import = run_shell(command + " -o " + log);
   ASSERT_EQ(import.status, 0) << import.err;
   ASSERT_EQ(
@@ -251,8 +252,8 @@ INSTANTIATE_TEST_SUITE_P(
                     RealRecording{"EurocCamera0", "euroc euroc/MH_01_part/mav0", "euroc_camera0.tum",
                                   "--point camera0"},
                     RealRecording{"TumRpy",
-                                  "tum tum/freiburg1_rpy_part --camera " FARPOINT_SOURCE_DIR
-                                  "/config/cameras/tum-freiburg1.yaml",
+                                  "tum tum/freiburg1_rpy_part --camera " + test::source_dir() +
+                                      "/config/cameras/tum-freiburg1.yaml",
                                   "tum_rpy_camera.tum", ""}),
     [](const testing::TestParamInfo<RealRecording>& info) { return info.param.name; });
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/common/errors.h"
 
@@ -115,7 +116,7 @@ TEST(Spy, TheProgramSaysWhatIsMissing) {
             "farpoint: spy: --jar /nonexistent/types.jar: no such file, expected a jar of LCM types\n");
   const ScratchFolder root;
   const std::string empty = "env -u JAVA_HOME -u DISPLAY PATH=" + root.path().string() + " ";
-  const ProgramResult java = run_shell(empty + std::string(FARPOINT_BINARY_DIR) + "/bin/farpoint spy");
+  const ProgramResult java = run_shell(empty + test::binary_dir() + "/bin/farpoint spy");
   EXPECT_EQ(java.status, 1);
   EXPECT_EQ(java.err.rfind("farpoint: spy: no java here, expected a Java runtime", 0), 0U) << java.err;
   EXPECT_EQ(std::count(java.err.begin(), java.err.end(), '\n'), 1);

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "slam/geometry/se3.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::tools {
 
@@ -61,7 +62,7 @@ ProgramResult run_shell(const std::string& command) {
 }
 
 ProgramResult run_farpoint_program(const std::string& arguments) {
-  return run_shell(FARPOINT_BINARY_DIR "/bin/farpoint " + arguments);
+  return run_shell(test::binary_dir() + "/bin/farpoint " + arguments);
 }
 
 void make_kitti(const fs::path& root) {
@@ -156,7 +157,7 @@ Trajectory disturbed(const Trajectory& path, double scale, double noise_m, std::
 }
 
 fs::path shared_folder() {
-  const fs::path folder = fs::path(FARPOINT_SOURCE_DIR) / ".." / "shared";
+  const fs::path folder = fs::path(test::source_dir()) / ".." / "shared";
   return fs::is_directory(folder / "data") ? folder : fs::path();
 }
 

@@ -9,17 +9,18 @@ import re
 import sys
 
 # What each folder may include besides itself. Arrows run one way:
-# geometry <- image <- map <- {tracking, mapping, loops, fusion} <- the facade <- daemon.
+# geometry <- image <- map <- solver <- {tracking, mapping, loops, fusion} <- the facade <- daemon.
 # "slam" is the facade: the files directly in slam/. "types" is what lcm-gen made.
 ALLOWED = {
     "slam/geometry": set(),
     "slam/image": {"slam/geometry"},
     "slam/map": {"slam/geometry", "slam/image"},
-    "slam/tracking": {"slam/geometry", "slam/image", "slam/map"},
-    "slam/mapping": {"slam/geometry", "slam/image", "slam/map"},
-    "slam/loops": {"slam/geometry", "slam/image", "slam/map"},
-    "slam/fusion": {"slam/geometry", "slam/image", "slam/map"},
-    "slam": {"slam/geometry", "slam/image", "slam/map", "slam/tracking", "slam/mapping", "slam/loops",
+    "slam/solver": {"slam/geometry", "slam/image", "slam/map"},
+    "slam/tracking": {"slam/geometry", "slam/image", "slam/map", "slam/solver"},
+    "slam/mapping": {"slam/geometry", "slam/image", "slam/map", "slam/solver"},
+    "slam/loops": {"slam/geometry", "slam/image", "slam/map", "slam/solver"},
+    "slam/fusion": {"slam/geometry", "slam/image", "slam/map", "slam/solver"},
+    "slam": {"slam/geometry", "slam/image", "slam/map", "slam/solver", "slam/tracking", "slam/mapping", "slam/loops",
              "slam/fusion"},
     "ipc": {"types"},
     "drivers": {"ipc", "types"},
@@ -34,9 +35,9 @@ OPTIONS = "slam/config.h"
 STAGES = "slam/stages.h"
 SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set()}
 # The tools read camera files and refuse input as the daemon does, and speak with it.
-SHARED_WITH_TOOLS = {"daemon/errors.h", "daemon/yaml_file.h", "daemon/camera_file.h", "daemon/calibration_message.h",
-                     "daemon/control_socket.h"}
-SHARED_READERS = {"slam", "slam/map", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
+SHARED_WITH_TOOLS = {"daemon/config/errors.h", "daemon/config/yaml_file.h", "daemon/config/camera_file.h",
+                     "daemon/config/calibration_message.h", "daemon/system/control_socket.h"}
+SHARED_READERS = {"slam", "slam/map", "slam/solver", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.
 FORBIDDEN_IN_SLAM = re.compile(
     r"<(iostream|fstream|filesystem|cstdio|stdio\.h|thread|mutex|shared_mutex|condition_variable|future|"

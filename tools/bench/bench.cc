@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/log_frame_source.h"
-#include "daemon/rig.h"
+#include "daemon/config/rig.h"
+#include "daemon/input/log_frame_source.h"
 #include "slam/estimator.h"
 #include "tools/common/errors.h"
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "daemon/config.h"
+#include "daemon/config/config.h"
 #include "tools/bench/report.h"
 
 namespace farpoint::tools {

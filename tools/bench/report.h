@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/stage_clock.h"
+#include "daemon/system/stage_clock.h"
 #include "tools/common/json.h"
 
 namespace farpoint::tools {

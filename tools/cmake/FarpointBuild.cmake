@@ -13,8 +13,10 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
-  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  # Paths below the clone are hashed relative to it: a clone in another folder finds the objects of this one.
+  set(launcher ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE_PROGRAM})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${launcher})
+  set(CMAKE_C_COMPILER_LAUNCHER ${launcher})
 endif()
 
 # One instruction set for the whole program, the platform's baseline: Eigen's alignment must match Debian's
@@ -52,9 +54,7 @@ function(farpoint_test name folder)
     return()
   endif()
   farpoint_test_program(${name} ${sources})
-  target_compile_definitions(${name} PRIVATE FARPOINT_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
-                             FARPOINT_BINARY_DIR="${CMAKE_BINARY_DIR}")
-  target_link_libraries(${name} PRIVATE ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
+  target_link_libraries(${name} PRIVATE farpoint_test_paths ${ARGN} GTest::gtest GTest::gtest_main Threads::Threads)
   # Printed values hold addresses, which would give a test another name in every build.
   gtest_discover_tests(${name} NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${folder} TIMEOUT 600)
 endfunction()

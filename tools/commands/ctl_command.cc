@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "daemon/control_socket.h"
+#include "daemon/system/control_socket.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
 

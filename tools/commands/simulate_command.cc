@@ -6,8 +6,8 @@
 #include "tools/commands/simulate_stream.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
-#include "tools/simulate/recorder.h"
-#include "tools/simulate/world_file.h"
+#include "tools/simulate/stream/recorder.h"
+#include "tools/simulate/world/world_file.h"
 
 namespace farpoint::tools {
 namespace {

@@ -6,9 +6,9 @@
 #include "ipc/channels.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
-#include "tools/simulate/measurements.h"
-#include "tools/simulate/stop_signals.h"
-#include "tools/simulate/stream.h"
+#include "tools/simulate/sensors/measurements.h"
+#include "tools/simulate/stream/stop_signals.h"
+#include "tools/simulate/stream/stream.h"
 
 namespace farpoint::tools {
 namespace {

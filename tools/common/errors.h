@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "daemon/errors.h"
+#include "daemon/config/errors.h"
 
 namespace farpoint::tools {
 

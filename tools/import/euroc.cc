@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "daemon/yaml_file.h"
+#include "daemon/config/yaml_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 

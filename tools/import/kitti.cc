@@ -5,7 +5,7 @@
 #include <charconv>
 #include <map>
 
-#include "daemon/yaml_file.h"
+#include "daemon/config/yaml_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 

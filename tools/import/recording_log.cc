@@ -4,7 +4,7 @@
 #include <limits>
 #include <memory>
 
-#include "daemon/calibration_message.h"
+#include "daemon/config/calibration_message.h"
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"

@@ -1,6 +1,6 @@
 #include "tools/import/tum.h"
 
-#include "daemon/camera_file.h"
+#include "daemon/config/camera_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 #include "tools/trajectory/trajectory.h"

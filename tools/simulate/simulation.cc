@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "daemon/camera_file.h"
+#include "daemon/config/camera_file.h"
 #include "tools/common/errors.h"
-#include "tools/simulate/props.h"
-#include "tools/simulate/random.h"
-#include "tools/simulate/world_file.h"
+#include "tools/simulate/world/props.h"
+#include "tools/simulate/world/random.h"
+#include "tools/simulate/world/world_file.h"
 
 namespace farpoint::tools::simulate {
 namespace {

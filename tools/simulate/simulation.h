@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "farpoint/simulation_t.hpp"
-#include "tools/simulate/camera_sensor.h"
-#include "tools/simulate/renderer.h"
-#include "tools/simulate/trajectory.h"
-#include "tools/simulate/world.h"
+#include "tools/simulate/render/renderer.h"
+#include "tools/simulate/sensors/camera_sensor.h"
+#include "tools/simulate/sensors/vehicle_motion.h"
+#include "tools/simulate/world/world.h"
 
 namespace farpoint::tools::simulate {
 

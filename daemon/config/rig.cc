@@ -1,0 +1,74 @@
+#include "daemon/config/rig.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "daemon/config/config.h"
+
+namespace farpoint::daemon {
+namespace {
+
+[[noreturn]] void refuse(int camera_index, const std::string& why) {
+  throw InputError(fmt::format("CALIBRATION, camera {}: {}", camera_index, why));
+}
+
+slam::CameraModel model_of(const camera_calibration_t& camera, int camera_index) {
+  if (camera.model == "pinhole-radtan") return slam::CameraModel::kPinholeRadtan;
+  if (camera.model == "kannala-brandt") return slam::CameraModel::kKannalaBrandt;
+  refuse(camera_index, "model '" + camera.model + "', expected 'pinhole-radtan' or 'kannala-brandt'");
+}
+
+slam::SE3 pose_of(const camera_calibration_t& camera, int camera_index) {
+  const Eigen::Quaterniond q(camera.orientation[0], camera.orientation[1], camera.orientation[2],
+                             camera.orientation[3]);
+  const Eigen::Vector3d t(camera.position[0], camera.position[1], camera.position[2]);
+  // Data sets give rotation matrices with few digits: allow their rounding, not more.
+  constexpr double kNormTolerance = 1e-3;
+  if (!t.allFinite() || !(std::abs(q.norm() - 1.0) < kNormTolerance)) {
+    refuse(camera_index,
+           "T_body_camera is no rigid motion, expected a finite position and a unit quaternion");
+  }
+  return {q.normalized(), t};
+}
+
+slam::Camera camera_of(const camera_calibration_t& camera, int camera_index) {
+  slam::Camera::Parameters p;
+  p.model = model_of(camera, camera_index);
+  p.width_px = camera.width;
+  p.height_px = camera.height;
+  p.fx_px = camera.fx;
+  p.fy_px = camera.fy;
+  p.cx_px = camera.cx;
+  p.cy_px = camera.cy;
+  std::copy(std::begin(camera.distortion), std::end(camera.distortion), p.distortion.begin());
+  const std::string problem = slam::Camera::check(p);
+  if (!problem.empty()) refuse(camera_index, problem);
+  return slam::Camera(p);
+}
+
+}  // namespace
+
+slam::Rig make_rig(const calibration_t& calibration, int camera_index) {
+  const int cameras = static_cast<int>(calibration.cameras.size());
+  if (camera_index >= cameras) {
+    throw InputError(fmt::format("CALIBRATION: {} cameras, expected camera {} (key camera.index) among them",
+                                 cameras, camera_index));
+  }
+  const camera_calibration_t& camera = calibration.cameras[static_cast<std::size_t>(camera_index)];
+  slam::Rig rig;
+  rig.cameras.push_back({camera.name, camera_of(camera, camera_index), pose_of(camera, camera_index)});
+  return rig;
+}
+
+std::string calibration_hash(const calibration_t& calibration) {
+  calibration_t timeless = calibration;
+  timeless.utime = 0;
+  std::vector<std::uint8_t> bytes;
+  ipc::encode(timeless, &bytes);
+  return fmt::format("{:016x}", fnv1a_64(std::string(bytes.begin(), bytes.end())));
+}
+
+}  // namespace farpoint::daemon

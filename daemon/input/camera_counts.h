@@ -1,0 +1,20 @@
+// One live camera's counts as those of all that came in.
+#pragma once
+
+#include "daemon/input/counts.h"
+#include "drivers/camera/camera.h"
+
+namespace farpoint::daemon {
+
+[[nodiscard]] inline InputCounts input_counts(const drivers::CameraCounts& c) {
+  InputCounts in;
+  in.images = c.frames + c.flagged + c.undecodable + c.times_backwards;
+  in.undecodable = c.undecodable;
+  in.times_backwards = c.times_backwards;
+  in.missing = c.missing;
+  in.flagged = c.flagged;
+  in.camera_losses = c.lost + c.stalled;
+  return in;
+}
+
+}  // namespace farpoint::daemon

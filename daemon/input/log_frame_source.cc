@@ -1,0 +1,115 @@
+#include "daemon/input/log_frame_source.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+
+#include "daemon/config/rig.h"
+
+namespace farpoint::daemon {
+namespace {
+
+drivers::LogSource open_source(const std::string& path) {
+  try {
+    return drivers::LogSource(path);
+  } catch (const std::runtime_error& error) {
+    const std::string what = error.what();
+    const bool says = what.find("expected") != std::string::npos;
+    throw InputError(what + (says ? "" : ", expected the name of an LCM log"));
+  }
+}
+
+std::int64_t as_signed(std::uint64_t count) {
+  return static_cast<std::int64_t>(count);
+}
+
+std::string damage_text(const ipc::LogDamage& damage) {
+  if (damage.places == 0) return "";
+  return fmt::format("; {}, first damage at byte {}",
+                     damage.cut_off ? "the log is cut off" : "the log is damaged", damage.first_offset);
+}
+
+}  // namespace
+
+LogFrameSource::LogFrameSource(const std::string& path, int camera_index)
+    : name_(path == "-" ? "standard input" : path), camera_index_(camera_index), source_(open_source(path)) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(path, error);
+  if (path != "-" && !error) file_bytes_ = static_cast<double>(bytes);
+}
+
+bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
+  drivers::LogItem item;
+  while (source_.next(&item)) {
+    offset_ = item.offset;
+    if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
+    if (item.kind != drivers::LogItemKind::kImage || item.camera != camera_index_) continue;
+    if (!calibration_) {
+      ++before_calibration_;
+      continue;
+    }
+    const StageScope scope(clock, timing_t::STAGE_DECODE);
+    const ipc::ImageStatus status = source_.decode(item, &image_);
+    if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
+    if (status != ipc::ImageStatus::kOk) continue;
+    *frame = {item.utime, item.image->sequence, &image_};
+    gave_image_ = true;
+    return true;
+  }
+  if (!source_.damage().read_error.empty()) {
+    throw std::runtime_error(name_ + ": reading failed (" + source_.damage().read_error + ")");
+  }
+  if (!gave_image_) refuse_empty();
+  return false;
+}
+
+void LogFrameSource::take_calibration(const calibration_t& calibration) {
+  if (!calibration_) {
+    calibration_ = calibration;
+    return;
+  }
+  if (calibration_hash(calibration) == calibration_hash(*calibration_)) return;
+  if (calibrations_ignored_++ == 0) {
+    spdlog::warn(
+        "{}: another CALIBRATION at byte {} is ignored, expected the first to hold for the whole log", name_,
+        offset_);
+  }
+}
+
+void LogFrameSource::refuse_empty() const {
+  const drivers::LogSourceCounts& c = source_.counts();
+  const std::string damage = damage_text(source_.damage());
+  if (source_.events() == 0) throw InputError(name_ + ": no LCM event, expected an LCM log" + damage);
+  if (!calibration_) {
+    throw InputError(fmt::format("{}: no CALIBRATION message in {} events, expected one before the images{}",
+                                 name_, source_.events(), damage));
+  }
+  throw InputError(
+      fmt::format("{}: no usable image of CAMERA_{} in {} events, expected images (other cameras {}, before "
+                  "the calibration {}, "
+                  "wrong size {}, undecodable {}, unknown camera {}, time not after the one before {}){}",
+                  name_, camera_index_, source_.events(), as_signed(c.images) - before_calibration_,
+                  before_calibration_, c.images_wrong_size, c.images_undecodable + c.messages_undecodable,
+                  c.images_unknown_camera, c.times_backwards, damage));
+}
+
+InputCounts LogFrameSource::counts() const {
+  const drivers::LogSourceCounts& c = source_.counts();
+  InputCounts counts;
+  // What is found out by decoding had been counted as an image before.
+  counts.images = as_signed(c.images + c.images_wrong_size + c.images_unknown_camera) - wrong_size_decoded_;
+  counts.wrong_size = as_signed(c.images_wrong_size);
+  counts.undecodable = as_signed(c.images_undecodable);
+  counts.unknown_camera = as_signed(c.images_unknown_camera) + before_calibration_;
+  counts.times_backwards = as_signed(c.times_backwards);
+  counts.messages_undecodable = as_signed(c.messages_undecodable);
+  counts.log_damages = as_signed(source_.damage().places);
+  return counts;
+}
+
+double LogFrameSource::progress() const {
+  return file_bytes_ > 0.0 ? static_cast<double>(offset_) / file_bytes_ : -1.0;
+}
+
+}  // namespace farpoint::daemon

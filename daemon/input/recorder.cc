@@ -1,0 +1,82 @@
+#include "daemon/input/recorder.h"
+
+#include <algorithm>
+
+#include "ipc/channels.h"
+
+namespace farpoint::daemon {
+
+Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration)
+    : name(ipc::kCameraChannelPrefix + std::to_string(camera)),
+      images(kWaiting, Image{{},
+                             std::vector<std::uint8_t>(
+                                 static_cast<std::size_t>(calibration.width * calibration.height), 0)}) {
+  message.camera = camera;
+  message.width = message.row_stride = calibration.width;
+  message.height = calibration.height;
+  message.pixel_format = image_t::PIXEL_FORMAT_GREY;
+  message.size = calibration.width * calibration.height;
+}
+
+Recorder::Recorder(const std::string& path, const calibration_t& calibration) : log_(path) {
+  for (const camera_calibration_t& camera : calibration.cameras)
+    channels_.emplace_back(static_cast<int>(channels_.size()), camera);
+  log_.write_message(ipc::kCalibrationChannel, calibration.utime, calibration);
+}
+
+void Recorder::offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame) {
+  slam::SpscRing<Image>& images = channels_[static_cast<std::size_t>(camera)].images;
+  Image* slot = images.begin_push();
+  if (slot == nullptr) {
+    left_out_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  slot->frame = frame;
+  std::copy(image.pixels.begin(), image.pixels.end(), slot->pixels.begin());
+  images.end_push();
+  arrived_.notify();
+}
+
+void Recorder::run() {
+  for (;;) {
+    const std::uint32_t seen = arrived_.seen();
+    const bool last = stop_.load(std::memory_order_acquire);
+    write_all();
+    if (last) return;
+    arrived_.wait(seen);
+  }
+}
+
+void Recorder::write_all() {
+  while (Channel* channel = oldest()) {
+    Image* image = channel->images.front();
+    image_t& message = channel->message;
+    message.utime = image->frame.utime;
+    message.sequence = image->frame.sequence;
+    message.exposure_us = image->frame.exposure_us;
+    message.gain = image->frame.gain;
+    message.data.assign(image->pixels.begin(), image->pixels.end());
+    channel->images.pop();
+    const bool stored = log_.write_message(channel->name, message.utime, message);
+    (stored ? written_ : left_out_).fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+Recorder::Channel* Recorder::oldest() {
+  Channel* found = nullptr;
+  std::int64_t found_utime = 0;
+  for (Channel& channel : channels_) {
+    const Image* image = channel.images.front();
+    if (image == nullptr || (found != nullptr && image->frame.utime >= found_utime)) continue;
+    found = &channel;
+    found_utime = image->frame.utime;
+  }
+  return found;
+}
+
+void Recorder::stop() {
+  stop_.store(true, std::memory_order_release);
+  arrived_.notify();
+}
+
+}  // namespace farpoint::daemon

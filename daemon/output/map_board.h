@@ -1,0 +1,41 @@
+// FARPOINT_MAP on its way from mapping, the only thread that may read the map, to the output.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "daemon/config/config.h"
+#include "daemon/output/publisher.h"
+#include "slam/estimator.h"
+#include "slam/spsc_ring.h"
+
+namespace farpoint::daemon {
+
+// Mapping encodes what a view was made of, at the configured rate; the output publishes it with the first
+// frame that knows that view. So the map that is shown is the one that was tracked against, and a repeated
+// run shows it at the same frame.
+class MapBoard {
+ public:
+  explicit MapBoard(const Config& config);
+
+  // Mapping's thread.
+  void note(const slam::Estimator& estimator, const slam::MappingNote& note);
+  // The output's thread.
+  void publish_known(std::uint64_t replies_taken, Publisher* publisher);
+
+ private:
+  struct Sheet {
+    std::uint64_t reply = 0;
+    std::int64_t utime = 0;
+    std::vector<std::uint8_t> bytes;  // an encoded map_t
+  };
+  // More than the output could be behind by: a view is made only after the one before was taken.
+  static constexpr std::size_t kSheets = 8;
+
+  const double rate_hz_, assumed_scale_;
+  const int points_;
+  std::int64_t next_utime_;
+  slam::SpscRing<Sheet> sheets_;
+};
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,96 @@
+#include "daemon/output/run_summary.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
+
+#include <algorithm>
+
+#include "daemon/system/stage_clock.h"
+
+namespace farpoint::daemon {
+namespace {
+
+double percent(std::int64_t part, std::int64_t whole) {
+  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+const char* outcome(const RunEnd& end) {
+  if (end.trajectories.empty()) return "done, never initialised";
+  if (end.last.state == slam::State::kLost || end.last.state == slam::State::kRelocalising)
+    return "done, lost at the end";
+  return "done";
+}
+
+const char* scale_text(slam::ScaleState scale) {
+  switch (scale) {
+    case slam::ScaleState::kUnknown:
+      return "unknown";
+    case slam::ScaleState::kAssumed:
+      return "assumed";
+    case slam::ScaleState::kMetric:
+      return "metric";
+  }
+  return "unknown";
+}
+
+// What was refused, where anything was.
+std::string refused_text(const InputCounts& in, std::int64_t frames_dropped) {
+  std::string text;
+  const auto add = [&](std::int64_t count, const char* what) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "; refused: " : ", ", count, what);
+  };
+  add(in.wrong_size, "images of wrong size");
+  add(in.undecodable, "undecodable images");
+  add(in.unknown_camera, "images without calibration");
+  add(in.times_backwards, "times not after the one before");
+  add(in.messages_undecodable, "undecodable messages");
+  add(in.log_damages, "damaged places of the log");
+  if (frames_dropped > 0) text += fmt::format("; dropped {} frames, tracking was behind", frames_dropped);
+  return text;
+}
+
+// What a map of fixed size lost, where anything was.
+std::string forgotten_text(const slam::EstimatorCounts& counts) {
+  if (counts.keyframes_forgotten == 0) return "";
+  return fmt::format("; the full map forgot {} keyframes and {} landmarks", counts.keyframes_forgotten,
+                     counts.landmarks_forgotten);
+}
+
+const char* calibration_text(const RunEnd& end) {
+  return end.counts.calibration_contradicted ? "; the images contradict the calibration" : "";
+}
+
+}  // namespace
+
+std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t frames_dropped,
+                      std::vector<double> cpu_ms, const std::vector<std::string>& written) {
+  std::sort(cpu_ms.begin(), cpu_ms.end());
+  double sum_ms = 0.0;
+  for (const double ms : cpu_ms) sum_ms += ms;
+  const std::size_t maps = end.trajectories.size();
+  constexpr double kMegabyte = 1e6;
+  return fmt::format(
+      "farpointd: {}: {} frames, {} tracked ({:.1f} %), {} map{}, lost {} time{}, scale {}; {:.1f} ms a "
+      "frame (CPU "
+      "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}",
+      outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames), maps,
+      maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s", scale_text(end.last.scale),
+      cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()), quantile(cpu_ms, 0.99),
+      static_cast<double>(peak_resident_bytes()) / kMegabyte, forgotten_text(end.counts),
+      calibration_text(end), refused_text(in, frames_dropped), written.empty() ? "" : "; wrote ",
+      fmt::join(written, " "));
+}
+
+std::FILE* line_stream(const Options& o) {
+  for (const std::string* path : {&o.output, &o.trajectory, &o.live_trajectory, &o.can_log}) {
+    if (*path == "-") return stderr;
+  }
+  return stdout;
+}
+
+void show_progress(double fraction, const slam::FrameResult& last, std::int64_t frames, Progress* progress) {
+  progress->show(fraction, fmt::format("frame {}, {}, {} landmarks agree", frames,
+                                       slam::to_string(last.state), last.inliers));
+}
+
+}  // namespace farpoint::daemon

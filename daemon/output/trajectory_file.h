@@ -1,0 +1,44 @@
+// Trajectories as files in TUM format: "seconds tx ty tz qx qy qz qw", T_map_body.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "daemon/output/pose_sink.h"
+#include "ipc/output_file.h"
+#include "slam/estimator.h"
+
+namespace farpoint::daemon {
+
+// One line with its newline. Seconds are utime / 1e6 with 6 decimals, exact; metres or map units with 9.
+[[nodiscard]] std::string tum_line(std::int64_t utime, const slam::SE3& T_map_body);
+
+// The same into a buffer, without the heap; returns its length. Long enough for any seven doubles.
+inline constexpr std::size_t kMaxTumLine = 2560;
+std::size_t put_tum_line(std::int64_t utime, const slam::SE3& T_map_body, std::span<char, kMaxTumLine> line);
+
+// Each valid pose as it is published.
+class LiveTrajectory final : public PoseSink {
+ public:
+  explicit LiveTrajectory(const std::string& path);  // throws std::runtime_error where it cannot be written
+  void on_frame(const FrameOutput& frame) override;
+  void close() { file_.close(); }  // throws std::runtime_error where something was not stored
+
+ private:
+  ipc::OutputFile file_;
+};
+
+// "dir/NAME.map2.tum" for dir/NAME.tum and 2.
+[[nodiscard]] std::string trajectory_path(const std::string& path, int map_number);
+
+// The first trajectory to `path` (a file that only says so where there is none), the others to NAME.map2.tum,
+// ...; such files of an earlier run beyond these are removed. Positions times unit_scale. Returns the paths
+// written; throws std::runtime_error.
+std::vector<std::string> write_final_trajectories(const std::string& path,
+                                                  const std::vector<slam::MapTrajectory>& trajectories,
+                                                  double unit_scale);
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,73 @@
+// One run of the estimator and everything that is published of it, wherever the images come from.
+//
+// Published times derive from the frames' utime; measured ones go to FARPOINT_TIMING, and in a threaded run
+// to FARPOINT_SCHEDULE, from which they are taken when the run is repeated.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/config/config.h"
+#include "daemon/input/counts.h"
+#include "daemon/output/frame_reporter.h"
+#include "daemon/output/messages.h"
+
+namespace farpoint::daemon {
+
+class Outputs;
+
+// One frame of a threaded run, to be repeated.
+struct RecordedChance {
+  FrameChance chance;
+  std::uint64_t replies_taken = 0;
+};
+
+class Session {
+ public:
+  // Allocates the estimator's memory. `sinks` and the publisher must outlive the session. Throws
+  // std::invalid_argument where configuration and rig cannot work together.
+  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
+          std::vector<PoseSink*> sinks, Publisher* publisher, bool with_schedule);
+
+  // Tracks one image, maps, and hands the outcome to every sink: in lockstep, or as `recorded` tells. `clock`
+  // holds what the caller measured of this frame (the decoding) and gets the rest.
+  const FrameOutput& process(const slam::FrameInput& input, const InputCounts& in, const OutputCounts& out,
+                             const RecordedChance* recorded, StageClock* clock);
+
+  // The parts of process(), for threads of their own.
+  [[nodiscard]] slam::Estimator& estimator() { return estimator_; }
+  [[nodiscard]] FrameReporter& reporter() { return *reporter_; }
+  // Keeps what the end of the run is summarised from; with_time: the times of valid frames, which grow.
+  void remember(const slam::FrameResult& published, bool valid, bool with_time = true);
+
+  // Finishes mapping's queue, and publishes the final trajectory and the summary.
+  const RunEnd& finish(const InputCounts& in);
+  // What is known without that.
+  [[nodiscard]] const RunEnd& end() const { return end_; }
+
+  [[nodiscard]] std::size_t pool_bytes() const { return pool_bytes_; }
+
+ private:
+  const slam::FrameResult& process_recorded(slam::FrameInput input, const RecordedChance& recorded);
+  void publish_results(const InputCounts& in);
+  void publish_landmarks();
+
+  Config config_;
+  FrameReporter::Names names_;
+  slam::Estimator estimator_;
+  MapBoard maps_;
+  std::size_t pool_bytes_ = 0;
+  Publisher* publisher_;
+  std::unique_ptr<FrameReporter> reporter_;
+  FramePackage package_;  // of process()
+  RunEnd end_;
+};
+
+// A session for the rig of `calibration` (see the constructor). Throws InputError where the calibration
+// cannot be used, ConfigError where the configuration cannot or wants more memory than there is.
+[[nodiscard]] std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
+                                                    Outputs* outputs, bool with_schedule);
+
+}  // namespace farpoint::daemon

@@ -1,0 +1,40 @@
+// The log of a service: to the journal (or standard error) and to a rotating file, written on a thread of its
+// own. Whoever logs never waits, and no flood of messages fills the disk.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <spdlog/sinks/base_sink.h>
+
+#include "daemon/config/config.h"
+
+namespace farpoint::daemon {
+
+// Replaces the log of start_logging(). Throws ConfigError where the file cannot be written.
+void start_service_log(const LogConfig& config);
+// Writes what is still to be written.
+void stop_service_log();
+
+// Hands on at most kBurst messages at once and kPerSecond a second after that; how many were left out is said
+// when there is room again. Errors always pass.
+class RateLimitedSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  static constexpr double kBurst = 100.0, kPerSecond = 10.0;
+  explicit RateLimitedSink(std::vector<spdlog::sink_ptr> sinks) : sinks_(std::move(sinks)) {}
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override;
+  void flush_() override;
+
+ private:
+  [[nodiscard]] bool may_pass(const spdlog::details::log_msg& message);
+  void hand_on(const spdlog::details::log_msg& message);
+
+  std::vector<spdlog::sink_ptr> sinks_;
+  double tokens_ = kBurst;
+  spdlog::log_clock::time_point last_{};
+  std::size_t left_out_ = 0;
+};
+
+}  // namespace farpoint::daemon

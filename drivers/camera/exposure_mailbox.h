@@ -1,0 +1,34 @@
+// Hands new exposure options from any thread to the capture thread, which never waits for them.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+
+#include "drivers/camera/camera.h"
+
+namespace farpoint::drivers {
+
+class ExposureMailbox {
+ public:
+  void put(const ExposureOptions& options) {
+    const std::lock_guard lock(mutex_);
+    options_ = options;
+    full_.store(true, std::memory_order_release);
+  }
+  // The capture thread: false where there is nothing new, or somebody is just writing it (ask again later).
+  [[nodiscard]] bool take(ExposureOptions* options) {
+    if (!full_.load(std::memory_order_acquire)) return false;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock()) return false;
+    full_.store(false, std::memory_order_relaxed);
+    *options = options_;
+    return true;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::atomic<bool> full_{false};
+  ExposureOptions options_;
+};
+
+}  // namespace farpoint::drivers

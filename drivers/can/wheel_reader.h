@@ -1,0 +1,36 @@
+// Wheel speeds out of CAN frames, named by message and signal of a DBC file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/can/wheel_signals.h"
+#include "ipc/message.h"
+
+namespace farpoint::drivers {
+
+class WheelReader {
+ public:
+  // As read_wheel_signals() takes them. Throws std::runtime_error saying what was expected.
+  WheelReader(const std::string& dbc_path, const std::string& names);
+
+  // True where the frame completes a measurement: every wheel heard since the last one. A wheel that says
+  // 'not available' is NaN; the vehicle's speed is the mean of the others. No allocation.
+  [[nodiscard]] bool take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t* message);
+
+  // Identifiers to listen to.
+  [[nodiscard]] std::vector<std::uint32_t> ids() const;
+
+ private:
+  struct Wheel {
+    WheelSignal signal;
+    double speed_m_s = 0.0;
+    bool heard = false;
+  };
+  void give(std::int64_t utime, wheels_t* message) const;
+
+  std::vector<Wheel> wheels_;
+};
+
+}  // namespace farpoint::drivers

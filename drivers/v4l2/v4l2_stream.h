@@ -1,0 +1,49 @@
+// The driver's buffers of one streaming V4L2 node: mapped, handed out, given back.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "drivers/v4l2/v4l2_format.h"
+
+namespace farpoint::drivers {
+
+// A filled buffer; the driver's again after give_back().
+struct V4l2Buffer {
+  std::uint32_t index = 0;
+  std::span<const std::uint8_t> bytes;  // what the driver filled
+  std::int64_t stamp_us = 0;
+  std::uint32_t flags = 0, sequence = 0;
+};
+
+class V4l2Stream {
+ public:
+  static constexpr int kMaxBuffers = 16;
+
+  V4l2Stream(V4l2System* system, const V4l2Node& node) : system_(system), node_(node) {}
+  ~V4l2Stream();
+  V4l2Stream(const V4l2Stream&) = delete;
+  V4l2Stream& operator=(const V4l2Stream&) = delete;
+
+  // Negative errno with *what telling what failed, else 0.
+  [[nodiscard]] int start(int buffers, const char** what);
+  // -EAGAIN where no buffer is filled.
+  [[nodiscard]] int take(V4l2Buffer* buffer);
+  [[nodiscard]] int give_back(const V4l2Buffer& buffer);
+
+ private:
+  struct Mapping {
+    void* memory = nullptr;
+    std::size_t bytes = 0;
+  };
+  [[nodiscard]] int map(std::uint32_t index);
+  [[nodiscard]] int queue(std::uint32_t index);
+
+  V4l2System* system_;
+  V4l2Node node_;
+  bool streaming_ = false;
+  std::array<Mapping, kMaxBuffers> mappings_{};
+};
+
+}  // namespace farpoint::drivers

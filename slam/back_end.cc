@@ -1,0 +1,112 @@
+#include "slam/back_end.h"
+
+#include <algorithm>
+
+namespace farpoint::slam {
+
+MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange* exchange)
+    : config_(config), exchange_(*exchange), mapper_(config, rig), poser_(config) {}
+
+void MappingSide::collect_recorded() {
+  while (const RecordedFrame* frame = exchange_.recorded.front()) {
+    if (config_.capacity.whole_trajectory) recorded_.emplace_back(*frame);
+    exchange_.recorded.pop();
+  }
+}
+
+bool MappingSide::step() {
+  MappingJob* job = exchange_.jobs.front();
+  if (job == nullptr) return false;
+  const StageSpan span(listener_, Stage::kMapping);
+  collect_recorded();
+  // There is room: a job has two replies at most, and tracking sends no more jobs than have room for theirs.
+  reply_ = exchange_.replies.begin_push();
+  reply_->number = ++replies_;
+  reply_->job_number = job->number;
+  reply_->frame_number = job->frame_number;
+  reply_->utime = job->utime;
+  reply_->stage = MappingStage::kDone;
+  reply_->ends_job = true;
+  switch (job->kind) {
+    case MappingJobKind::kStartMap:
+      reply_->stage = MappingStage::kStarted;
+      reply_->view = mapper_.start_map(job->pair, job->map_id);
+      break;
+    case MappingJobKind::kKeyframe:
+      reply_->view = inserted_ ? mapper_.refine() : mapper_.insert(job->keyframe);
+      if (inserted_ || reply_->view) reply_->stage = inserted_ ? MappingStage::kFull : MappingStage::kQuick;
+      inserted_ = reply_->stage == MappingStage::kQuick;
+      reply_->ends_job = !inserted_;
+      break;
+    case MappingJobKind::kPoseFrames:
+      pose_frames(*job);
+      break;
+    case MappingJobKind::kDiscardMap:
+      discard_map(job->map_id);
+      break;
+    case MappingJobKind::kRetireMap:
+      mapper_.retire_map(job->map_id);
+      break;
+  }
+  reply_->counts = mapper_.counts();
+  reply_->keyframes = static_cast<std::uint32_t>(mapper_.map().keyframes().size());
+  reply_->landmarks = static_cast<std::uint32_t>(mapper_.map().landmarks().size());
+  return true;
+}
+
+void MappingSide::hand_over() {
+  if (reply_->ends_job) {
+    // The slot must not keep frames and views from their pools.
+    MappingJob& job = *exchange_.jobs.front();
+    job.pair.first.reset();
+    job.pair.second.reset();
+    job.keyframe.frame.reset();
+    job.frames.clear();
+    job.view.reset();
+    exchange_.jobs.pop();
+  }
+  exchange_.replies.end_push();
+}
+
+void MappingSide::discard_map(std::int32_t map_id) {
+  std::erase_if(recorded_, [&](const KeptFrame& r) { return r.map_id == map_id; });
+  mapper_.discard_map(map_id);
+}
+
+bool MappingSide::pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
+                             std::vector<RecordedFrame>* posed) {
+  const TrackOutcome o = poser_.track_from(frame, *prior);
+  if (!o.ok || o.inliers < config_.tracking.min_inliers) return false;
+  *prior = o.T_world_body;
+  posed->push_back({frame.utime, job.map_id, job.view->reference_id,
+                    job.view->T_world_reference.inverse() * o.T_world_body});
+  return true;
+}
+
+// Frames from before the map: backwards from the pair that began it, and forwards those that came while the
+// map was being made.
+void MappingSide::pose_frames(const MappingJob& job) {
+  const auto first = std::find_if(recorded_.begin(), recorded_.end(),
+                                  [&](const KeptFrame& r) { return r.map_id == job.map_id; });
+  SE3 T_world_first;
+  if (first == recorded_.end() || !mapper_.map().pose_of(first->reference_id, &T_world_first)) return;
+  poser_.adopt(job.view, job.seen);
+  std::vector<const Frame*> frames;
+  for (const auto& f : job.frames) frames.push_back(f.get());
+  std::stable_sort(frames.begin(), frames.end(),
+                   [](const Frame* a, const Frame* b) { return a->number > b->number; });
+  std::vector<RecordedFrame> posed;
+  SE3 prior = T_world_first;
+  for (const Frame* f : frames)
+    if (f->number < job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
+  // The pair's second frame was recorded next, and stands at the second keyframe.
+  if (const auto second = std::next(first); second != recorded_.end())
+    (void)mapper_.map().pose_of(second->reference_id, &prior);
+  std::for_each(frames.rbegin(), frames.rend(), [&](const Frame* f) {
+    if (f->number > job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
+  });
+  poser_.adopt(nullptr, {});
+  for (const RecordedFrame& frame : posed) recorded_.emplace_back(frame);
+}
+
+}  // namespace farpoint::slam
