@@ -113,7 +113,7 @@ def record(binaries, logs, out):
 
 def facts(folder, types):
     found = {}
-    for path in sorted(folder.iterdir()):
+    for path in sorted(folder.glob("*.*")):
         if path.suffix == ".lcm":
             found.update({f"{path.name} {channel}": text for channel, text in channels(path, types).items()})
         else:
