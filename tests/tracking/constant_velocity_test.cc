@@ -21,16 +21,15 @@ double difference(const SE3& a, const SE3& b) {
   return a.boxminus_to(b).norm();
 }
 
-// A model with two accepted frames, kFrame_us and kStep apart.
-ConstantVelocity moving() {
-  ConstantVelocity model;
-  model.start(kStart, kFrame_us);
-  model.accept(kStart.boxplus(kStep), 2 * kFrame_us);
-  return model;
+// Two accepted frames, kFrame_us and kStep apart.
+void move(ConstantVelocity* model) {
+  model->start(kStart, kFrame_us);
+  model->accept(kStart.boxplus(kStep), 2 * kFrame_us);
 }
 
 TEST(ConstantVelocity, PredictsTheStepOfTheLastTwoFramesAgain) {
-  const ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   const SE3 last = kStart.boxplus(kStep);
   EXPECT_LT(difference(model.predict(3 * kFrame_us).T_world_body, last.boxplus(kStep)), 1e-12);
   EXPECT_LT(difference(model.predict(2 * kFrame_us + kFrame_us / 2).T_world_body, last.boxplus(0.5 * kStep)),
@@ -38,22 +37,28 @@ TEST(ConstantVelocity, PredictsTheStepOfTheLastTwoFramesAgain) {
 }
 
 TEST(ConstantVelocity, IsAStartWithoutInformation) {
-  EXPECT_EQ(moving().predict(3 * kFrame_us).information, Matrix6d::Zero());
+  ConstantVelocity model;
+  move(&model);
+  EXPECT_EQ(model.predict(3 * kFrame_us).information, Matrix6d::Zero());
 }
 
 TEST(ConstantVelocity, GivesItsVelocityASecondInBodyAxes) {
-  EXPECT_LT((moving().velocity_body() - 10.0 * kStep).norm(), 1e-10);
+  ConstantVelocity model;
+  move(&model);
+  EXPECT_LT((model.velocity_body() - 10.0 * kStep).norm(), 1e-10);
 }
 
 TEST(ConstantVelocity, StaysAtTheStartUntilAFrameIsAccepted) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   model.start(kStart, 5 * kFrame_us);
   EXPECT_EQ(difference(model.predict(6 * kFrame_us).T_world_body, kStart), 0.0);
   EXPECT_EQ(model.velocity_body(), Vector6d::Zero());
 }
 
 TEST(ConstantVelocity, StaysAtTheLastPoseAfterMoreThanASecondAndBeforeIt) {
-  const ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   const SE3 last = kStart.boxplus(kStep);
   EXPECT_GT(difference(model.predict(2 * kFrame_us + 1'000'000).T_world_body, last), 1.0);
   EXPECT_EQ(difference(model.predict(2 * kFrame_us + 1'000'001).T_world_body, last), 0.0);
@@ -61,10 +66,12 @@ TEST(ConstantVelocity, StaysAtTheLastPoseAfterMoreThanASecondAndBeforeIt) {
 }
 
 TEST(ConstantVelocity, HasNoVelocityOverASecondOfTrackingAndThreeOfAGap) {
-  ConstantVelocity tracked = moving();
+  ConstantVelocity tracked;
+  move(&tracked);
   tracked.accept(kStart, 2 * kFrame_us + 1'000'000);
   EXPECT_EQ(tracked.velocity_body(), Vector6d::Zero());
-  ConstantVelocity found = moving();
+  ConstantVelocity found;
+  move(&found);
   found.accept_on_trial(kStart, 2 * kFrame_us + 2'500'000);
   EXPECT_LT((found.velocity_body() - kStart.boxplus(kStep).boxminus_to(kStart) / 2.5).norm(), 1e-10);
   found.accept_on_trial(kStart, 2 * kFrame_us + 3'000'000);
@@ -75,7 +82,8 @@ TEST(ConstantVelocity, HasNoVelocityOverASecondOfTrackingAndThreeOfAGap) {
 // ------------------------------------------------------------------------------------------------------
 
 TEST(ConstantVelocity, APoseOnTrialIsNewestAndNotConfirmed) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   const SE3 last = kStart.boxplus(kStep), trial{so3_exp({0, 0, 1}), {50, 0, 0}};
   model.accept_on_trial(trial, 3 * kFrame_us);
   EXPECT_EQ(difference(model.newest().T_world_body, trial), 0.0);
@@ -85,14 +93,16 @@ TEST(ConstantVelocity, APoseOnTrialIsNewestAndNotConfirmed) {
 }
 
 TEST(ConstantVelocity, ASecondTrialMeasuresItsVelocityFromTheConfirmedPose) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   model.accept_on_trial({so3_exp({0, 0, 1}), {50, 0, 0}}, 3 * kFrame_us);
   model.accept_on_trial(kStart.boxplus(kStep).boxplus(2.0 * kStep), 4 * kFrame_us);
   EXPECT_LT((model.velocity_body() - 10.0 * kStep).norm(), 1e-10);
 }
 
 TEST(ConstantVelocity, AnAcceptedFrameConfirmsTheTrialBeforeIt) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   const SE3 trial{so3_exp({0, 0, 1}), {50, 0, 0}};
   model.accept_on_trial(trial, 3 * kFrame_us);
   model.accept(trial.boxplus(kStep), 4 * kFrame_us);
@@ -113,7 +123,8 @@ LocalView view_of(std::vector<ViewKeyframe> keyframes, std::int32_t map_id = 1) 
 const SE3 kOld{so3_exp({0, 0, 0.3}), {1, 1, 0}}, kNew{so3_exp({0, 0.1, 0.5}), {2, 1, -1}};
 
 TEST(ConstantVelocity, PosesFollowTheNewestKeyframeThatBothViewsContain) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   const SE3 trial{so3_exp({0, 0, 1}), {5, 0, 0}};
   model.accept_on_trial(trial, 3 * kFrame_us);
   const SE3 confirmed = model.confirmed().T_world_body;
@@ -127,7 +138,8 @@ TEST(ConstantVelocity, PosesFollowTheNewestKeyframeThatBothViewsContain) {
 }
 
 TEST(ConstantVelocity, PosesStayWhereViewsShareNoKeyframeOrAreOfDifferentMaps) {
-  ConstantVelocity model = moving();
+  ConstantVelocity model;
+  move(&model);
   model.correct(view_of({{1, kOld}}), view_of({{2, kNew}}));
   model.correct(view_of({{1, kOld}}, 1), view_of({{1, kNew}}, 2));
   EXPECT_EQ(difference(model.newest().T_world_body, kStart.boxplus(kStep)), 0.0);

@@ -134,7 +134,7 @@ TEST_F(MatcherTest, MatchesEachLandmarkWithTheFeatureThatShowsIt) {
     ASSERT_EQ(shown.point_of_feature[f], static_cast<int>(m.view_index));
     const Feature& feature = shown.frame->set.features[f];
     EXPECT_EQ(m.pixel, Eigen::Vector2f(feature.u_px, feature.v_px));
-    EXPECT_FLOAT_EQ(m.sigma_px, std::pow(1.2F, feature.level));
+    EXPECT_FLOAT_EQ(m.sigma_px, std::pow(1.2F, static_cast<float>(feature.level)));
     EXPECT_TRUE(m.inlier);
     EXPECT_FALSE(m.aligned);
   }
