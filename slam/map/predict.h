@@ -1,13 +1,10 @@
-// Where a landmark should appear in a camera, and how to find it there. Shared by tracking and mapping.
+// Where a landmark should appear in a camera. Shared by tracking and mapping.
 #pragma once
 
-#include <array>
-#include <cmath>
+#include <Eigen/Core>
 
 #include "slam/geometry/camera.h"
-#include "slam/image/feature_grid.h"
-#include "slam/image/kernels.h"
-#include "slam/map/landmark.h"
+#include "slam/geometry/se3.h"
 
 namespace farpoint::slam {
 
@@ -21,7 +18,7 @@ struct Prediction {
   double view_cosine = 1.0;   // between the anchor's ray and this camera's
 };
 
-// The inputs, in world axes, as ViewLandmark keeps them.
+// What a prediction is made from, in world axes, as ViewLandmark keeps it.
 struct PredictionInput {
   Eigen::Vector4d point_w = Eigen::Vector4d::Zero();
   Eigen::Vector3d anchor_w = Eigen::Vector3d::Zero();
@@ -34,7 +31,7 @@ class Predictor {
   // `camera` must outlive the predictor.
   Predictor(const Camera& camera, const SE3& T_camera_world)
       : camera_(camera), R_(T_camera_world.rotation()), t_(T_camera_world.t) {}
-  // False where the landmark does not project into the camera's image (border_px from the edge).
+  // Returns false where the landmark projects outside the image or within border_px of its edge.
   [[nodiscard]] bool predict(const PredictionInput& in, double border_px, Prediction* out) const {
     return predict(in.point_w, in.anchor_w, in.d_point_d_pixel, border_px, out);
   }
@@ -48,74 +45,20 @@ class Predictor {
   const Eigen::Vector3d t_;
 };
 
-// The same of a single one.
+// The same of one landmark.
 [[nodiscard]] bool predict(const PredictionInput& in, const Camera& camera, const SE3& T_camera_world,
                            double border_px, Prediction* out);
 
 // Pyramid level on which the landmark should be detected.
 [[nodiscard]] int predicted_level(int host_level, float scale_change, float scale_factor, int levels);
 
-// Two corners so close that they show the same point.
-[[nodiscard]] inline bool same_place(const Feature& a, const Feature& b) {
-  constexpr float kSamePlacePx = 3.0F;
-  return std::abs(a.u_px - b.u_px) < kSamePlacePx && std::abs(a.v_px - b.v_px) < kSamePlacePx;
-}
-
-struct DescriptorQuery {
-  Descriptor descriptor;
-  float u_px = 0, v_px = 0, radius_px = 0;
-  int min_level = 0, max_level = 0;
-  int max_hamming = 64;
-  float ratio = 0.9F;  // best must be below ratio * second best (of another place), 1: no test
-};
-// Index of the best feature that `usable(index)` admits, or -1. Corners at the best one's place are no rivals
-// of it: the same corner is often found on the next level too.
-template <typename Usable>
-[[nodiscard]] int find_descriptor(const FeatureSet& set, const FeatureGrid& grid, const DescriptorQuery& q,
-                                  Usable&& usable, int* distance = nullptr) {
-  constexpr int kNone = 257;
-  int best = -1, best_distance = kNone, second_distance = kNone;
-  bool uncertain = false;  // second_distance was taken around another best one
-  const auto visit = [&](auto&& consider) {
-    std::array<std::uint32_t, 64> indices;
-    std::array<std::uint16_t, 64> distances;
-    std::size_t count = 0;
-    const auto flush = [&] {
-      active_kernels().hamming(q.descriptor.words.data(), set.descriptors.front().words.data(),
-                               indices.data(), static_cast<int>(count), distances.data());
-      for (std::size_t k = 0; k < count; ++k) consider(std::size_t{indices[k]}, int{distances[k]});
-      count = 0;
-    };
-    grid.visit_near(set.features, q.u_px, q.v_px, q.radius_px, q.min_level, q.max_level, [&](std::size_t i) {
-      if (!usable(i)) return;
-      indices[count++] = static_cast<std::uint32_t>(i);
-      if (count == indices.size()) flush();
-    });
-    if (count > 0) flush();
-  };
-  const auto at_best = [&](std::size_t i) {
-    return best >= 0 && same_place(set.features[static_cast<std::size_t>(best)], set.features[i]);
-  };
-  visit([&](std::size_t i, int d) {
-    if (d < best_distance) {
-      uncertain = at_best(i);
-      if (!uncertain) second_distance = best_distance;
-      best_distance = d;
-      best = static_cast<int>(i);
-    } else if (d < second_distance && !at_best(i)) {
-      second_distance = d;
-    }
-  });
-  if (best < 0 || best_distance > q.max_hamming) return -1;
-  if (uncertain) {
-    second_distance = kNone;
-    visit([&](std::size_t i, int d) {
-      if (d < second_distance && !at_best(i)) second_distance = d;
-    });
-  }
-  if (static_cast<float>(best_distance) > q.ratio * static_cast<float>(second_distance)) return -1;
-  if (distance != nullptr) *distance = best_distance;
-  return best;
+// Whether a patch can be matched where it is predicted. From more than 60 degrees beside the anchor's ray it
+// looks different; beyond these changes of size it has too few pixels left.
+[[nodiscard]] inline bool is_matchable(const Prediction& p) {
+  constexpr double kMinViewCosine = 0.5;
+  constexpr float kMinScaleChange = 0.3F, kMaxScaleChange = 3.3F;
+  return p.view_cosine >= kMinViewCosine && p.scale_change > kMinScaleChange &&
+         p.scale_change < kMaxScaleChange;
 }
 
 }  // namespace farpoint::slam

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "slam/map/predict.h"
+#include "slam/image/descriptor_search.h"
 
 namespace farpoint::slam {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/image/descriptor_search.h"
 #include "slam/map/predict.h"
 #include "slam/mapping/forgetting.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "slam/geometry/two_view.h"
-#include "slam/map/predict.h"
+#include "slam/image/descriptor_search.h"
 
 namespace farpoint::slam {
 

@@ -3,7 +3,7 @@
 
 #include "slam/config.h"
 #include "slam/map/local_view.h"
-#include "slam/tracking/tracker.h"
+#include "slam/tracking/track_outcome.h"
 
 namespace farpoint::slam {
 

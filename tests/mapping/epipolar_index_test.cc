@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "slam/map/predict.h"
+#include "slam/image/descriptor_search.h"
 
 namespace farpoint::slam {
 namespace {

@@ -1,0 +1,71 @@
+#include "slam/tracking/constant_velocity.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace farpoint::slam {
+
+namespace {
+
+constexpr double kArcStep_s = 0.1;
+
+// The motion that led from one to the other; without a velocity where more than longest_s lies between.
+Motion moved(const Motion& from, const SE3& T_world_body, std::int64_t utime, double longest_s) {
+  const double dt_s = seconds_between(from.utime, utime);
+  Motion to{.T_world_body = T_world_body, .utime = utime};
+  if (dt_s > 0.0 && dt_s < longest_s) {
+    to.velocity = from.T_world_body.boxminus_to(T_world_body) / dt_s;
+    to.has_velocity = true;
+  }
+  return to;
+}
+
+}  // namespace
+
+double seconds_between(std::int64_t from_utime, std::int64_t to_utime) {
+  return static_cast<double>(to_utime - from_utime) * 1e-6;
+}
+
+SE3 Motion::extrapolated(double dt_s) const {
+  SE3 T = T_world_body;
+  const int steps = static_cast<int>(std::ceil(dt_s / kArcStep_s));
+  for (int i = 0; i < steps; ++i) T = T.boxplus(velocity * (dt_s / steps));
+  return T;
+}
+
+void ConstantVelocity::start(const SE3& T_world_body, std::int64_t utime) {
+  newest_ = {.T_world_body = T_world_body, .utime = utime};
+  confirmed_ = newest_;
+}
+
+void ConstantVelocity::correct(const LocalView& before, const LocalView& after) {
+  if (before.map_id != after.map_id) return;
+  for (auto old = before.keyframes.rbegin(); old != before.keyframes.rend(); ++old) {
+    const auto now = std::find_if(after.keyframes.begin(), after.keyframes.end(),
+                                  [&](const ViewKeyframe& k) { return k.id == old->id; });
+    if (now == after.keyframes.end()) continue;
+    for (Motion* m : {&newest_, &confirmed_})
+      m->T_world_body = now->T_world_body * (old->T_world_body.inverse() * m->T_world_body);
+    return;
+  }
+}
+
+void ConstantVelocity::accept(const SE3& T_world_body, std::int64_t utime) {
+  newest_ = moved(newest_, T_world_body, utime, kLongestStep_s);
+  confirmed_ = newest_;
+}
+
+void ConstantVelocity::accept_on_trial(const SE3& T_world_body, std::int64_t utime) {
+  newest_ = moved(confirmed_, T_world_body, utime, kLongestGap_s);
+}
+
+PosePrior ConstantVelocity::predict(std::int64_t utime) const {
+  PosePrior prior;
+  prior.T_world_body = newest_.T_world_body;
+  const double dt_s = seconds_between(newest_.utime, utime);
+  if (newest_.has_velocity && dt_s > 0.0 && dt_s <= kLongestStep_s)
+    prior.T_world_body = newest_.T_world_body.boxplus(newest_.velocity * dt_s);
+  return prior;
+}
+
+}  // namespace farpoint::slam

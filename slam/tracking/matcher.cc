@@ -1,0 +1,169 @@
+#include "slam/tracking/matcher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/image/descriptor_search.h"
+#include "slam/tracking/work_space.h"
+
+namespace farpoint::slam {
+
+namespace {
+
+constexpr double kBorderPx = 4.0;
+// Sigmas of a landmark's depth that the search window takes in, and the most that they widen it.
+constexpr double kDepthSigmas = 2.0, kMostDepthPx = 20.0;
+// How far alignment may move from the corner, pixels of the corner's level.
+constexpr float kMaxAlignmentShiftPx = 2.0F;
+
+}  // namespace
+
+Matcher::Matcher(const EstimatorConfig& config) : config_(config.tracking), pyramid_(config.pyramid) {
+  const auto landmarks = static_cast<std::size_t>(config.capacity.landmarks),
+             in_view = static_cast<std::size_t>(config.capacity.view_landmarks),
+             features = static_cast<std::size_t>(config.extractor.features);
+  reserve_touched(&candidates_, in_view);
+  reserve_touched(&matches_, features);
+  reserve_touched(&taken_, features);
+  reserve_touched(&seen_, in_view);
+  reserve_touched(&matched_, in_view);
+  reserve_touched(&candidate_of_, in_view);
+  view_index_of_slot_.assign(landmarks, 0);
+  for (int l = 0; l < pyramid_.levels; ++l) level_scale_.push_back(std::pow(pyramid_.scale_factor, l));
+}
+
+std::size_t Matcher::bytes() const {
+  return capacity_bytes(candidates_) + capacity_bytes(matches_) + capacity_bytes(taken_) +
+         capacity_bytes(seen_) + capacity_bytes(matched_) + capacity_bytes(candidate_of_) +
+         capacity_bytes(view_index_of_slot_);
+}
+
+void Matcher::set_view(std::shared_ptr<const LocalView> view) {
+  view_ = std::move(view);
+  if (!view_) return;
+  for (std::size_t i = 0; i < view_->landmarks.size(); ++i)
+    view_index_of_slot_[view_->landmarks[i].handle.index] = static_cast<std::uint32_t>(i);
+  mark_seen({});
+}
+
+void Matcher::mark_seen(std::span<const LandmarkHandle> seen) {
+  seen_.assign(view_->landmarks.size(), 0);
+  for (const LandmarkHandle& h : seen) {
+    // An entry of an older view names another landmark, or none.
+    const std::uint32_t i = view_index_of_slot_[h.index];
+    if (i < view_->landmarks.size() && view_->landmarks[i].handle == h) seen_[i] = 1;
+  }
+}
+
+void Matcher::begin(const Frame& frame) {
+  taken_.assign(frame.set.features.size(), 0);
+  matches_.clear();
+}
+
+void Matcher::project(const Frame& frame, const SE3& T_world_body, LandmarkSubset subset) {
+  const StageSpan span(listener_, Stage::kMatching);
+  candidates_.clear();
+  const RigCamera& camera = camera_of(frame);
+  const Predictor predictor(camera.camera, (T_world_body * camera.T_body_camera).inverse());
+  MatchCandidate c;
+  for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
+    if (!in_subset(i, subset)) continue;
+    const ViewLandmark& l = view_->landmarks[i];
+    if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &c.prediction)) continue;
+    if (!is_matchable(c.prediction)) continue;
+    c.view_index = static_cast<std::uint32_t>(i);
+    c.level = predicted_level(l.host_level, c.prediction.scale_change,
+                              static_cast<float>(pyramid_.scale_factor), pyramid_.levels);
+    candidates_.push_back(c);
+  }
+}
+
+Match Matcher::make_match(const Frame& frame, std::uint32_t view_index, std::int32_t feature) const {
+  const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
+  Match m;
+  m.view_index = view_index;
+  m.feature = feature;
+  m.pixel = {f.u_px, f.v_px};
+  m.sigma_px = static_cast<float>(level_scale_[f.level]);
+  m.inlier = true;
+  return m;
+}
+
+int Matcher::match(const Frame& frame, double radius_px, float ratio) {
+  const StageSpan span(listener_, Stage::kMatching);
+  int found = 0;
+  matched_.assign(view_->landmarks.size(), 0);
+  for (const Match& m : matches_) matched_[m.view_index] = 1;
+  for (const MatchCandidate& c : candidates_) {
+    const ViewLandmark& l = view_->landmarks[c.view_index];
+    if (matched_[c.view_index] != 0) continue;
+    const double depth_px = std::min(
+        kMostDepthPx, kDepthSigmas * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
+    DescriptorQuery q;
+    q.descriptor = l.descriptor;
+    q.u_px = static_cast<float>(c.prediction.pixel.x());
+    q.v_px = static_cast<float>(c.prediction.pixel.y());
+    q.radius_px = static_cast<float>(radius_px * level_scale_[static_cast<std::size_t>(c.level)] + depth_px);
+    q.min_level = c.level - 1;
+    q.max_level = c.level + 1;
+    q.max_hamming = config_.max_hamming;
+    q.ratio = ratio;
+    const int feature =
+        find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return taken_[f] == 0; });
+    if (feature < 0) continue;
+    taken_[static_cast<std::size_t>(feature)] = 1;
+    matches_.push_back(make_match(frame, c.view_index, feature));
+    ++found;
+  }
+  return found;
+}
+
+void Matcher::add(const Frame& frame, std::uint32_t view_index, std::int32_t feature) {
+  std::uint8_t& taken = taken_[static_cast<std::size_t>(feature)];
+  if (taken != 0) return;
+  taken = 1;
+  matches_.push_back(make_match(frame, view_index, feature));
+}
+
+void Matcher::align(const Frame& frame) {
+  if (!frame.image) return;
+  const StageSpan span(listener_, Stage::kAlignment);
+  candidate_of_.assign(view_->landmarks.size(), -1);
+  for (std::size_t i = 0; i < candidates_.size(); ++i)
+    candidate_of_[candidates_[i].view_index] = static_cast<std::int32_t>(i);
+  std::size_t kept = 0;
+  for (Match m : matches_) {
+    const std::int32_t candidate = candidate_of_[m.view_index];
+    if (candidate < 0) continue;
+    if (align_one(frame, candidates_[static_cast<std::size_t>(candidate)].prediction, &m))
+      matches_[kept++] = m;
+    else
+      taken_[static_cast<std::size_t>(m.feature)] = 0;
+  }
+  matches_.resize(kept);
+}
+
+bool Matcher::align_one(const Frame& frame, const Prediction& prediction, Match* match) const {
+  const Feature& f = frame.set.features[static_cast<std::size_t>(match->feature)];
+  const auto level_scale = static_cast<float>(level_scale_[f.level]);
+  const Alignment a = frame.image->align(landmark_of(*match).patch, prediction.A_target_host,
+                                         {f.u_px, f.v_px}, kMaxAlignmentShiftPx * level_scale);
+  if (!a.ok) return false;
+  match->pixel = a.pixel;
+  match->sigma_px = std::hypot(a.sigma_px, static_cast<float>(config_.pixel_sigma_px));
+  match->aligned = true;
+  return true;
+}
+
+void Matcher::drop_outliers() {
+  std::size_t kept = 0;
+  for (const Match& m : matches_) {
+    if (m.inlier)
+      matches_[kept++] = m;
+    else
+      taken_[static_cast<std::size_t>(m.feature)] = 0;
+  }
+  matches_.resize(kept);
+}
+
+}  // namespace farpoint::slam

@@ -1,0 +1,111 @@
+// Association of one frame's features with the landmarks of the local view: project, match, align.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "slam/config.h"
+#include "slam/map/frame.h"
+#include "slam/map/local_view.h"
+#include "slam/map/predict.h"
+#include "slam/stages.h"
+
+namespace farpoint::slam {
+
+// A landmark of the view matched to a feature of the frame.
+struct Match {
+  std::uint32_t view_index = 0;  // in LocalView::landmarks
+  std::int32_t feature = -1;
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // measured, level 0
+  float sigma_px = 1.0F;                            // its error, level-0 pixels
+  bool aligned = false;
+  bool inlier = false;
+};
+
+// A landmark of the view that projects into the frame.
+struct MatchCandidate {
+  std::uint32_t view_index = 0;  // in LocalView::landmarks
+  Prediction prediction;
+  int level = 0;  // pyramid level on which its corner is expected
+};
+
+// Which landmarks of the view are searched for.
+enum class LandmarkSubset : std::uint8_t {
+  kSeen,    // those marked as seen
+  kRecent,  // the same and those of the reference keyframe
+  kAll,
+};
+
+// The matches of one frame. A feature belongs to one match at most, and a landmark to one at most.
+//
+// Tracking's thread. Makes no heap call after construction while view and frame keep to the configured
+// capacities. Every index refers to the view of the last set_view(); matching needs a view.
+class Matcher {
+ public:
+  explicit Matcher(const EstimatorConfig& config);
+  void listen(StageListener* listener) { listener_ = listener; }
+
+  // Takes another view and forgets which landmarks were seen. Null lets go of the present view.
+  void set_view(std::shared_ptr<const LocalView> view);
+  [[nodiscard]] const std::shared_ptr<const LocalView>& view() const { return view_; }
+  // Marks these landmarks, and no others, as seen; skips those that the view does not contain.
+  void mark_seen(std::span<const LandmarkHandle> seen);
+  [[nodiscard]] bool in_subset(std::size_t view_index, LandmarkSubset subset) const {
+    if (subset == LandmarkSubset::kAll || seen_[view_index] != 0) return true;
+    return subset == LandmarkSubset::kRecent && view_->landmarks[view_index].in_reference;
+  }
+  // The camera that took the frame, as the view has it calibrated.
+  [[nodiscard]] const RigCamera& camera_of(const Frame& frame) const {
+    return view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
+  }
+
+  // Drops all matches; every feature of the frame is free.
+  void begin(const Frame& frame);
+  // Replaces the candidates by the landmarks of the subset that a camera at this pose could match.
+  void project(const Frame& frame, const SE3& T_world_body, LandmarkSubset subset);
+  // Matches candidates that have no match with free features, by descriptor. `radius_px`: half width of the
+  // window on level 0; it grows with the candidate's level and with the sigma of its depth. `ratio`: of
+  // DescriptorQuery. Returns the number of new matches.
+  int match(const Frame& frame, double radius_px, float ratio);
+  // Matches a landmark with a feature, unless the feature is taken.
+  void add(const Frame& frame, std::uint32_t view_index, std::int32_t feature);
+  // Measures each match to a fraction of a pixel. Drops a match that does not align or is no candidate, and
+  // frees the feature of one that does not align. Without pixels the matches stay as they are.
+  void align(const Frame& frame);
+  // Drops the matches that are no inliers and frees their features.
+  void drop_outliers();
+
+  [[nodiscard]] const std::vector<MatchCandidate>& candidates() const { return candidates_; }
+  [[nodiscard]] const std::vector<Match>& matches() const { return matches_; }
+  [[nodiscard]] const ViewLandmark& landmark_of(const Match& match) const {
+    return view_->landmarks[match.view_index];
+  }
+  void set_inlier(std::size_t match, bool inlier) { matches_[match].inlier = inlier; }
+
+  // Bytes of the work space.
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  [[nodiscard]] Match make_match(const Frame& frame, std::uint32_t view_index, std::int32_t feature) const;
+  [[nodiscard]] bool align_one(const Frame& frame, const Prediction& prediction, Match* match) const;
+
+  const TrackingConfig config_;
+  const PyramidOptions pyramid_;
+  std::vector<double> level_scale_;  // of each pyramid level
+  StageListener* listener_ = nullptr;
+  std::shared_ptr<const LocalView> view_;
+
+  std::vector<MatchCandidate> candidates_;
+  std::vector<Match> matches_;
+  std::vector<std::uint8_t> taken_;         // one a feature: it belongs to a match
+  std::vector<std::uint8_t> seen_;          // one a view landmark
+  std::vector<std::uint8_t> matched_;       // the same; valid within match()
+  std::vector<std::int32_t> candidate_of_;  // the same: index in candidates_, or -1; valid within align()
+  // One a landmark slot of the map: index in the view. An entry is valid where the view has the handle there.
+  std::vector<std::uint32_t> view_index_of_slot_;
+};
+
+}  // namespace farpoint::slam

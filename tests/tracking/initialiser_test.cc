@@ -1,0 +1,139 @@
+#include "slam/tracking/initialiser.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "tests/support/tracking_scene.h"
+
+namespace farpoint::slam {
+namespace {
+
+using test::SceneFrame;
+using test::ScenePoint;
+using test::TrackingScene;
+
+class InitialiserTest : public testing::Test {
+ protected:
+  InitialiserTest() {
+    // While the scale is unknown the body stands at the camera.
+    scene.rig.cameras[0].T_body_camera.t.setZero();
+    initialiser.emplace(scene.config, scene.rig);
+  }
+  std::optional<InitialPair> add(const SE3& T_world_body) {
+    frames.push_back(scene.look(T_world_body, static_cast<std::int64_t>(frames.size()) * 100'000));
+    return initialiser->add(frames.back().frame);
+  }
+  [[nodiscard]] const SceneFrame& shown(const std::shared_ptr<Frame>& frame) const {
+    return frames[static_cast<std::size_t>(frame->number)];
+  }
+  static SE3 aside(double metres) {
+    return TrackingScene::pose({0.1 * metres, metres, 0}, {0, 0, 0.01 * metres});
+  }
+
+  TrackingScene scene{400};
+  std::optional<Initialiser> initialiser;
+  std::vector<SceneFrame> frames;
+};
+
+TEST_F(InitialiserTest, FindsMotionAndPointsOfTwoFrames) {
+  EXPECT_FALSE(add(aside(0)).has_value());
+  const std::optional<InitialPair> pair = add(aside(0.8));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first, frames[0].frame);
+  EXPECT_EQ(pair->second, frames[1].frame);
+  const SE3 truth = aside(0).inverse() * aside(0.8);
+  const double baseline = truth.t.norm();
+  EXPECT_LT((pair->T_first_second.t - truth.t / baseline).norm(), 2e-3);
+  EXPECT_LT(so3_log(pair->T_first_second.q.conjugate() * truth.q).norm(), 5e-4);
+  EXPECT_GT(pair->points.size(), 300U);
+  EXPECT_EQ(initialiser->last_matches(), static_cast<int>(pair->points.size()));
+  for (const InitialPoint& p : pair->points) {
+    const int point = frames[0].point_of_feature[p.feature_first];
+    ASSERT_EQ(point, frames[1].point_of_feature[p.feature_second]);
+    const double distance = scene.points[static_cast<std::size_t>(point)].position_w.norm();
+    EXPECT_NEAR(p.inverse_depth, baseline / distance, 0.02 * baseline / distance + 1e-3) << point;
+  }
+}
+
+TEST_F(InitialiserTest, WaitsForParallax) {
+  (void)add(aside(0));
+  EXPECT_FALSE(add(aside(0.02)).has_value());
+  EXPECT_FALSE(add(aside(0.04)).has_value());
+  const std::optional<InitialPair> pair = add(aside(0.8));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first, frames[0].frame);
+}
+
+TEST_F(InitialiserTest, InventsNothingFromARotation) {
+  for (int i = 0; i < 6; ++i)
+    EXPECT_FALSE(add(TrackingScene::pose({0, 0, 0}, {0, 0.01 * i, 0.02 * i})).has_value()) << i;
+}
+
+TEST_F(InitialiserTest, NeedsEnoughLandmarks) {
+  for (std::size_t i = 70; i < scene.points.size(); ++i) scene.points[i].visible = false;
+  (void)add(aside(0));
+  EXPECT_FALSE(add(aside(0.8)).has_value());
+}
+
+TEST_F(InitialiserTest, AnotherPlaceBecomesTheReference) {
+  (void)add(aside(0));
+  for (ScenePoint& p : scene.points)
+    for (std::uint64_t& word : p.descriptor.words) word = ~word * 0x9E3779B97F4A7C15ULL;
+  EXPECT_FALSE(add(aside(0.8)).has_value());
+  const std::optional<InitialPair> pair = add(aside(1.6));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first, frames[1].frame);
+}
+
+TEST_F(InitialiserTest, RenewsItsReferenceAfterTheConfiguredFrames) {
+  scene.config.initialisation.max_frames = 6;
+  initialiser.emplace(scene.config, scene.rig);
+  for (int i = 0; i <= 7; ++i) EXPECT_FALSE(add(aside(0.0)).has_value()) << i;
+  const std::optional<InitialPair> pair = add(aside(0.8));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first->number, 4U);  // half way between frame 0 and frame 7
+}
+
+TEST_F(InitialiserTest, FollowsCornersOverManyFrames) {
+  // In all 100 px, more than the window of 51 px: each search starts where the last one found the corner.
+  scene.config.initialisation.min_parallax_rad = 0.5;  // no pair, so that the reference stays
+  initialiser.emplace(scene.config, scene.rig);
+  for (int i = 0; i <= 6; ++i) (void)add(TrackingScene::pose({0, 0, 0}, {0, 0, 0.04 * i}));
+  EXPECT_GT(initialiser->last_matches(), 200);
+}
+
+TEST_F(InitialiserTest, RemembersTheLastSixtyFramesOldestFirst) {
+  for (int i = 0; i < 70; ++i) {
+    frames.push_back(scene.look(SE3{}, i));
+    initialiser->remember(frames.back().frame);
+  }
+  ASSERT_EQ(initialiser->history().size(), Initialiser::kHistoryFrames);
+  EXPECT_EQ(initialiser->history().front(), frames[10].frame);
+  EXPECT_EQ(initialiser->history().back(), frames[69].frame);
+  initialiser->clear();
+  EXPECT_TRUE(initialiser->history().empty());
+}
+
+TEST_F(InitialiserTest, AClearedOneBeginsWithTheNextFrame) {
+  (void)add(aside(0));
+  initialiser->clear();
+  EXPECT_FALSE(add(aside(0.8)).has_value());
+  const std::optional<InitialPair> pair = add(aside(1.6));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first, frames[1].frame);
+}
+
+// The pixels of most frames go back to their pool: only a frame half way can be the next reference.
+TEST_F(InitialiserTest, KeepsThePixelsOfReferenceNewestAndEverySecondFrameSinceHalfWay) {
+  for (int i = 0; i <= 10; ++i) (void)add(SE3{});
+  std::vector<std::uint64_t> with_pixels;
+  for (const auto& f : initialiser->history())
+    if (f->image != nullptr) with_pixels.push_back(f->number);
+  EXPECT_EQ(with_pixels, (std::vector<std::uint64_t>{0, 6, 8, 10}));
+}
+
+}  // namespace
+}  // namespace farpoint::slam
