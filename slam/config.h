@@ -4,10 +4,8 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
-#include "slam/geometry/camera.h"
-#include "slam/geometry/se3.h"
+#include "slam/geometry/rig.h"
 #include "slam/image/extractor.h"
 #include "slam/image/pyramid.h"
 
@@ -16,19 +14,6 @@ namespace farpoint::slam {
 // How landmarks are promoted and used (METHOD.md). The landmark type and the tracker are the same in every
 // mode.
 enum class LandmarkMode { kBaseline, kVmp };
-
-// One camera on the body. T_body_camera maps camera coordinates into the body's.
-struct RigCamera {
-  std::string name;
-  Camera camera;
-  SE3 T_body_camera;
-};
-
-// What frames come from. While the scale of the map is unknown, the lever arm between body and camera
-// (metres) cannot be expressed in map units: the body then stands at camera 0 with the body's axes.
-struct Rig {
-  std::vector<RigCamera> cameras;
-};
 
 struct CapacityConfig {
   int keyframes = 1000;                // of all maps together
