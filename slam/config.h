@@ -56,6 +56,12 @@ struct LandmarkConfig {
   int max_bearing = 4000;                // candidates alive at once
 };
 
+struct BundleOptions;
+struct BundleProblem;
+struct BundleSummary;
+// Minimises a bundle problem (slam/solver/bundle_problem.h).
+using SolveBundle = void (*)(const BundleOptions*, BundleProblem*, BundleSummary*);
+
 struct MappingConfig {
   int neighbours = 20;              // keyframes searched for new landmarks
   int window_keyframes = 20;        // optimised by local BA
@@ -66,6 +72,8 @@ struct MappingConfig {
   int quick_view_delay_frames = 1;  // lockstep: triangulation is visible so many frames after the keyframe
   int full_view_delay_frames = 2;   // lockstep: local BA is visible so many frames after the keyframe
   std::string solver = "schur";     // schur | ceres
+  // Solves instead of the estimator's own solver. Required where `solver` is ceres.
+  SolveBundle solve_instead = nullptr;
 };
 
 // Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be
