@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "daemon/config/errors.h"
+#include "daemon/config/config.h"
 #include "slam/ceres_module.h"
 
 namespace farpoint::daemon {
