@@ -1,7 +1,5 @@
 #include "daemon/run.h"
 
-#include <dlfcn.h>
-
 #include <cstdio>
 #include <filesystem>
 
@@ -12,6 +10,7 @@
 #include "daemon/replay.h"
 #include "daemon/system/logging.h"
 #include "daemon/system/service_log.h"
+#include "daemon/system/solver_loader.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -29,14 +28,6 @@ Config load_configuration(const Options& options) {
   for (const std::string& setting : options.settings) apply_setting(setting, &config, &origins);
   check_relations(config, origins);
   return config;
-}
-
-// Libraries that would start threads of their own sum in another order each time: one thread each.
-void make_libraries_single_threaded() {
-  // Where this machine's BLAS is OpenBLAS; the reference BLAS has no threads.
-  if (void* set_threads = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
-    reinterpret_cast<void (*)(int)>(set_threads)(1);
-  }
 }
 
 // However the run ends, what it logged is written.
@@ -58,9 +49,9 @@ int run_checked(int argc, const char* const* argv) {
     std::fputs(line.text_and_leave.c_str(), stdout);
     return 0;
   }
-  const Config config = load_configuration(line.options);
+  Config config = load_configuration(line.options);
+  load_solver(ceres_module_path(), &config.estimator.mapping);
   start_logging(config.log.level);
-  make_libraries_single_threaded();
   if (line.options.replay.empty()) {
     start_service_log(config.log);
     const ServiceLogEnd end;

@@ -4,10 +4,8 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
-#include "slam/geometry/camera.h"
-#include "slam/geometry/se3.h"
+#include "slam/geometry/rig.h"
 #include "slam/image/extractor.h"
 #include "slam/image/pyramid.h"
 
@@ -16,19 +14,6 @@ namespace farpoint::slam {
 // How landmarks are promoted and used (METHOD.md). The landmark type and the tracker are the same in every
 // mode.
 enum class LandmarkMode { kBaseline, kVmp };
-
-// One camera on the body. T_body_camera maps camera coordinates into the body's.
-struct RigCamera {
-  std::string name;
-  Camera camera;
-  SE3 T_body_camera;
-};
-
-// What frames come from. While the scale of the map is unknown, the lever arm between body and camera
-// (metres) cannot be expressed in map units: the body then stands at camera 0 with the body's axes.
-struct Rig {
-  std::vector<RigCamera> cameras;
-};
 
 struct CapacityConfig {
   int keyframes = 1000;                // of all maps together
@@ -71,6 +56,12 @@ struct LandmarkConfig {
   int max_bearing = 4000;                // candidates alive at once
 };
 
+struct BundleOptions;
+struct BundleProblem;
+struct BundleSummary;
+// Minimises a bundle problem (slam/solver/bundle_problem.h).
+using SolveBundle = void (*)(const BundleOptions*, BundleProblem*, BundleSummary*);
+
 struct MappingConfig {
   int neighbours = 20;              // keyframes searched for new landmarks
   int window_keyframes = 20;        // optimised by local BA
@@ -81,6 +72,8 @@ struct MappingConfig {
   int quick_view_delay_frames = 1;  // lockstep: triangulation is visible so many frames after the keyframe
   int full_view_delay_frames = 2;   // lockstep: local BA is visible so many frames after the keyframe
   std::string solver = "schur";     // schur | ceres
+  // Solves instead of the estimator's own solver. Required where `solver` is ceres.
+  SolveBundle solve_instead = nullptr;
 };
 
 // Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be

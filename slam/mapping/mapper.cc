@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "slam/image/descriptor_search.h"
 #include "slam/map/predict.h"
@@ -81,6 +82,8 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
               static_cast<std::size_t>(config.mapping.window_sightings)) {
   problem_.make_room(static_cast<std::size_t>(config.mapping.window_landmarks),
                      static_cast<std::size_t>(config.mapping.window_sightings));
+  if (config.mapping.solver == "ceres" && config.mapping.solve_instead == nullptr)
+    throw std::invalid_argument("mapping.solver: ceres: no solver was given with it");
   pose_index_.assign(static_cast<std::size_t>(config.capacity.keyframes), -1);
 }
 
@@ -457,8 +460,11 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   if (problem_.points.empty()) return false;
   BundleOptions options;
   options.iterations = iterations;
-  const BundleSummary summary =
-      config_.mapping.solver == "ceres" ? solve_ceres(options, &problem_) : solver_.solve(options, &problem_);
+  BundleSummary summary;
+  if (config_.mapping.solve_instead != nullptr)
+    config_.mapping.solve_instead(&options, &problem_, &summary);
+  else
+    summary = solver_.solve(options, &problem_);
   ++counts_.local_ba;
   if (!summary.usable) return false;
   soundness_ = soundness_of(problem_);

@@ -1,25 +1,24 @@
-// Bundle adjustment over body poses and host-anchored inverse depths, as plain arrays: what the solvers
-// share.
+// Bundle adjustment over body poses and host-anchored inverse depths, as plain arrays that all solvers share.
 //
 // Residual of one measurement, in units of its sigma:
 //     r = (project_c(T_camera_body T_body_world T_world_host T_host_anchor (f, rho)) - z) / sigma,     2x1
 // with homogeneous points (f, rho), so that a landmark at infinity (rho = 0) is as well conditioned as a near
-// one. Cost: sum over the points of their weight times the Huber losses of |r|, delta = kHuberDelta.
+// one. Cost: sum over the points of their weight times the Huber losses of |r|, delta = kHuberDelta, and the
+// costs of the factors.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
-#include "slam/config.h"
+#include "slam/geometry/rig.h"
+#include "slam/geometry/robust.h"
 #include "slam/geometry/se3.h"
+#include "slam/solver/factor.h"
 
 namespace farpoint::slam {
 
 struct BundleProblem {
-  struct Pose {
-    SE3 T_world_body;
-    bool fixed = false;
-  };
+  using Pose = PoseState;
   struct Measurement {
     int pose = 0;
     int camera = 0;
@@ -42,18 +41,27 @@ struct BundleProblem {
   std::vector<Pose> poses;
   std::vector<Point> points;
   std::vector<Measurement> measurements;  // grouped by point
+  // States that landmarks do not measure, and the factors that do. Empty for images alone.
+  std::vector<MotionState> motions;
+  std::vector<GlobalState> globals;
+  std::vector<const StateFactor*> factors;  // owned by the caller
 
+  [[nodiscard]] StateWindow states() const { return {poses, motions, globals}; }
   void clear() {
     poses.clear();
     points.clear();
     measurements.clear();
+    motions.clear();
+    globals.clear();
+    factors.clear();
   }
-  // Empty, and with memory in place for so many.
+  // Empties the problem and takes memory for this many points and measurements.
   void make_room(std::size_t point_count, std::size_t measurement_count) {
     points.assign(point_count, {});
     measurements.assign(measurement_count, {});
     clear();
   }
+  // Memory of the lists that grow with points and measurements.
   [[nodiscard]] std::size_t bytes() const {
     return points.capacity() * sizeof(Point) + measurements.capacity() * sizeof(Measurement);
   }
@@ -70,10 +78,6 @@ struct BundleSummary {
   bool usable = false;
 };
 
-// 95 % quantile of chi-square with two degrees of freedom: beyond it a measurement counts as an outlier.
-inline constexpr double kChi2TwoDof = 5.991;
-inline constexpr double kHuberDelta = 2.4477;  // sqrt(kChi2TwoDof)
-
 // One measurement's residual and derivatives at the present state. False where it does not project.
 struct BundleLinearisation {
   Eigen::Vector2d residual;
@@ -85,13 +89,11 @@ struct BundleLinearisation {
 [[nodiscard]] bool residual(const BundleProblem& problem, const BundleProblem::Point& point,
                             const BundleProblem::Measurement& measurement, Eigen::Vector2d* out);
 
-// A measurement that stopped projecting (behind the camera) costs a constant, as one of 100 sigmas does, and
-// pulls on nothing: beyond anything a sane start holds, so that no step gains by throwing measurements behind
-// a camera.
+// Cost of a measurement that does not project (behind the camera), as of one of 100 sigmas; its derivatives
+// are zero. No sane start holds a larger residual, so no step gains by moving points behind a camera.
 inline constexpr double kLostCost = kHuberDelta * (100.0 - 0.5 * kHuberDelta);
 
-// What all measurements of one state share, made once a state instead of once a measurement. Rotations as
-// matrices; world axes throughout.
+// What all measurements of one pose share, computed once a pose. Rotations are matrices, axes the world's.
 class BundleFrames {
  public:
   struct Body {
@@ -109,7 +111,7 @@ class BundleFrames {
     double inverse_depth = 0;
   };
 
-  // Of every pose of the problem; keeps its memory from call to call.
+  // Computes all poses of the problem. Keeps its memory from call to call.
   void update(const BundleProblem& problem);
 
   [[nodiscard]] const Body& body(int pose) const { return bodies_[static_cast<std::size_t>(pose)]; }
@@ -117,7 +119,7 @@ class BundleFrames {
     return views_[static_cast<std::size_t>(m.pose) * cameras_ + static_cast<std::size_t>(m.camera)];
   }
   [[nodiscard]] WorldPoint world_point(const BundleProblem::Point& point) const;
-  // The same, where the bearing in the host's body axes is known already: it never changes.
+  // The same from a bearing that the caller has rotated into the host's body axes.
   [[nodiscard]] WorldPoint world_point(const BundleProblem::Point& point,
                                        const Eigen::Vector3d& bearing_body) const {
     const Body& host = body(point.host);
@@ -134,12 +136,12 @@ class BundleFrames {
   std::vector<View> views_;  // pose-major
 };
 
-// One measurement's residual and derivatives by the world point, all in sigmas. False where it does not
+// One measurement's residual and derivatives by the world point, in sigmas. False where the point does not
 // project.
 struct WorldLinearisation {
   Eigen::Vector2d residual;
   Matrix23d d_xyz;
-  Eigen::Vector2d d_inverse_depth;  // in all, the part through xyz included
+  Eigen::Vector2d d_inverse_depth;  // total derivative, the part through xyz included
 };
 [[nodiscard]] bool linearise(const BundleFrames& frames, const BundleProblem::Point& point,
                              const BundleProblem::Measurement& measurement, BundleLinearisation* out);
@@ -148,13 +150,10 @@ struct WorldLinearisation {
 [[nodiscard]] bool residual_world(const BundleFrames::WorldPoint& point, const BundleFrames::View& view,
                                   const BundleProblem::Measurement& measurement, Eigen::Vector2d* out);
 
-// Levenberg-Marquardt with the inverse depths eliminated first (Schur complement): one thread, no time limit,
-// the same bytes every time.
+// Minimises the cost by SchurSolver with work space of its own.
 BundleSummary solve_schur(const BundleOptions& options, BundleProblem* problem);
-// The same cost by Ceres; the reference the tests hold solve_schur to.
-BundleSummary solve_ceres(const BundleOptions& options, BundleProblem* problem);
 
-// Fills chi2 of every measurement and sigma of every inverse depth at the present state.
+// Sets chi2 of every measurement and sigma of every inverse depth at the present state.
 void evaluate_bundle(BundleProblem* problem);
 
 }  // namespace farpoint::slam

@@ -5,19 +5,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/geometry/robust.h"
+#include "slam/geometry/so3_jacobian.h"
+
 namespace farpoint::slam {
 
 namespace {
 
-constexpr double kChi2Inlier = 5.991;  // 95 %, two degrees of freedom: what counts as an inlier
-constexpr double kHuber = 2.4477;      // its root
-// 99.9 %: what takes part in the next round. Cutting at the inliers' 95 % instead would make the pose's
-// variance 19 % larger than the normal equations say: of 2D normal residuals it keeps 95 % of the information
-// but, of the pull that holds the pose, only 80 %; variance 1 / 0.80 against 1 / 0.95.
-constexpr double kChi2Used = 13.816;
-// A measurement that does not project costs as one of 1000 sigmas does: a pose that sees nothing must not
-// win.
-constexpr double kLostCost = kHuber * (1000.0 - 0.5 * kHuber);
+// What takes part in the next round. Cutting at the inliers' 95 % instead would make the pose's variance 19 %
+// larger than the normal equations say. Of 2D normal residuals it keeps 95 % of the information and 80 % of
+// the pull that holds the pose; variance 1 / 0.80 against 1 / 0.95.
+constexpr double kChi2Used = kChi2TwoDof999;
+// Cost of a measurement that does not project, as of one of 1000 sigmas: a pose that sees nothing never wins.
+constexpr double kLostCost = kHuberDelta * (1000.0 - 0.5 * kHuberDelta);
 constexpr int kIterations = 8;
 
 // What the measurements of one camera share at one pose.
@@ -97,9 +97,27 @@ struct Normal {
   double cost = 0;
 };
 
-// Huber's loss over the measurements in use.
-Normal accumulate(const Rig& rig, const SE3& T, std::span<const PoseMeasurement> measurements) {
+// What all steps of one solve share.
+struct Problem {
+  const Rig& rig;
+  const PosePrior& prior;
+  bool pulls;  // the prior has information
+};
+
+void add_prior(const PosePrior& prior, const SE3& T, Normal* n) {
+  Vector6d r;
+  Matrix6d J;
+  prior_residual(prior.T_world_body, T, &r, &J);
+  const Vector6d weighted = prior.information * r;
+  n->cost += 0.5 * r.dot(weighted);
+  n->H.noalias() += J.transpose() * prior.information * J;
+  n->g.noalias() += J.transpose() * weighted;
+}
+
+// Huber's loss over the measurements in use, and the prior's.
+Normal accumulate(const Problem& problem, const SE3& T, std::span<const PoseMeasurement> measurements) {
   Normal n;
+  const Rig& rig = problem.rig;
   Views views(rig, T);
   for (const PoseMeasurement& m : measurements) {
     if (!m.inlier) continue;
@@ -108,27 +126,27 @@ Normal accumulate(const Rig& rig, const SE3& T, std::span<const PoseMeasurement>
       n.cost += kLostCost;
       continue;
     }
-    const double squared = w.r.squaredNorm(), r = std::sqrt(squared);
-    const double weight = r > kHuber ? kHuber / r : 1.0;
-    n.cost += r > kHuber ? kHuber * (r - 0.5 * kHuber) : 0.5 * squared;
+    const double squared = w.r.squaredNorm(), weight = huber_weight(squared);
+    n.cost += huber_cost(squared);
     n.H.noalias() += weight * w.J.transpose() * w.J;
     n.g.noalias() += weight * w.J.transpose() * w.r;
   }
+  if (problem.pulls) add_prior(problem.prior, T, &n);
   return n;
 }
 
-SE3 descend(const Rig& rig, SE3 T, std::span<const PoseMeasurement> measurements) {
+SE3 descend(const Problem& problem, SE3 T, std::span<const PoseMeasurement> measurements) {
   double lambda = 1e-4;
-  Normal n = accumulate(rig, T, measurements);
+  Normal n = accumulate(problem, T, measurements);
   for (int i = 0; i < kIterations; ++i) {
     Matrix6d damped = n.H;
     damped.diagonal() *= 1.0 + lambda;
     damped.diagonal().array() += 1e-9;
     const Vector6d step = damped.ldlt().solve(-n.g);
-    // The step foretells what it gains; where that is nothing, the trial would only cost time.
+    // The step predicts its gain. Where that is nothing, the trial would only cost time.
     if (!step.allFinite() || -n.g.dot(step) < 2e-6 * n.cost) break;
     const SE3 candidate = T.boxplus(step);
-    const Normal next = accumulate(rig, candidate, measurements);
+    const Normal next = accumulate(problem, candidate, measurements);
     if (next.cost < n.cost) {
       const bool done = n.cost - next.cost < 1e-5 * n.cost;
       T = candidate;
@@ -176,21 +194,29 @@ bool pose_residual(const Rig& rig, const SE3& T_world_body, const PoseMeasuremen
                      d_pose, d_inverse_depth);
 }
 
-PoseSolution solve_pose(const Rig& rig, const SE3& start, std::span<PoseMeasurement> measurements,
+void prior_residual(const SE3& T_prior, const SE3& T_world_body, Vector6d* residual, Matrix6d* d_pose) {
+  *residual = T_prior.boxminus_to(T_world_body);
+  d_pose->setZero();
+  d_pose->topLeftCorner<3, 3>() = (T_prior.q.conjugate() * T_world_body.q).toRotationMatrix();
+  d_pose->bottomRightCorner<3, 3>() = so3_right_jacobian_inverse(residual->tail<3>());
+}
+
+PoseSolution solve_pose(const Rig& rig, const PosePrior& prior, std::span<PoseMeasurement> measurements,
                         int rounds) {
   constexpr int kFewest = 6;
+  const Problem problem{rig, prior, (prior.information.array() != 0.0).any()};
   PoseSolution s;
-  s.T_world_body = start;
+  s.T_world_body = prior.T_world_body;
   for (int round = 0; round < rounds; ++round) {
-    s.T_world_body = descend(rig, s.T_world_body, measurements);
+    s.T_world_body = descend(problem, s.T_world_body, measurements);
     const Sorted used = classify(rig, s.T_world_body, kChi2Used, measurements);
     s.inliers = used.inliers;
     s.rms = used.rms;
     if (used.inliers < kFewest) return s;
     if (!used.changed) break;
   }
-  const Normal n = accumulate(rig, s.T_world_body, measurements);
-  const Sorted last = classify(rig, s.T_world_body, kChi2Inlier, measurements);
+  const Normal n = accumulate(problem, s.T_world_body, measurements);
+  const Sorted last = classify(rig, s.T_world_body, kChi2TwoDof, measurements);
   s.inliers = last.inliers;
   s.rms = last.rms;
   if (last.inliers < kFewest) return s;

@@ -1,9 +1,10 @@
-// Robust 6-DoF pose of the body from landmarks: fixed size, no heap.
+// Robust 6-DoF pose of the body from landmarks and a prior. Fixed size, no heap.
 #pragma once
 
 #include <span>
 
-#include "slam/config.h"
+#include "slam/geometry/motion_model.h"
+#include "slam/geometry/rig.h"
 #include "slam/geometry/se3.h"
 
 namespace farpoint::slam {
@@ -16,7 +17,7 @@ struct PoseMeasurement {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;
   int camera = 0;
-  bool inlier = true;  // in: starts as; out: chi-square below the 95 % quantile
+  bool inlier = true;  // in: takes part in the first round; out: chi-square below the 95 % quantile
 };
 
 struct PoseSolution {
@@ -27,12 +28,24 @@ struct PoseSolution {
   bool ok = false;
 };
 
-// Levenberg-Marquardt with Huber weights, in at most so many rounds; after each round it is decided anew
-// which measurements take part (chi-square below the 99.9 % quantile), and when none changes sides it is
-// done. The covariance of a residual is sigma^2 I + J_rho J_rho' sigma_rho^2: what the landmark's depth
-// leaves open along its epipolar line does not pull the pose.
-[[nodiscard]] PoseSolution solve_pose(const Rig& rig, const SE3& T_world_body_start,
+// Levenberg-Marquardt with Huber weights from the prior's pose, in at most `rounds` rounds. Each round ends
+// with a new choice of the measurements that take part: chi-square below the 99.9 % quantile. The rounds end
+// early where that choice is the last one's.
+//
+// Covariance of a measurement's residual: sigma^2 I + J_rho J_rho' sigma_rho^2, so that an uncertain depth
+// does not pull the pose along its epipolar line. The prior adds 0.5 r' information r with r of
+// prior_residual; zero information adds nothing. Fewer than 6 inliers give ok = false, whatever the prior.
+[[nodiscard]] PoseSolution solve_pose(const Rig& rig, const PosePrior& prior,
                                       std::span<PoseMeasurement> measurements, int rounds = 4);
+// The same from a start without information.
+[[nodiscard]] inline PoseSolution solve_pose(const Rig& rig, const SE3& T_world_body_start,
+                                             std::span<PoseMeasurement> measurements, int rounds = 4) {
+  return solve_pose(rig, PosePrior{T_world_body_start, Matrix6d::Zero()}, measurements, rounds);
+}
+
+// Residual of a pose against an expected one, T_prior.boxminus_to(T_world_body), and its derivative by the
+// pose.
+void prior_residual(const SE3& T_prior, const SE3& T_world_body, Vector6d* residual, Matrix6d* d_pose);
 
 // Residual (2x1, px) and its derivative by the pose; for the solver and its tests.
 [[nodiscard]] bool pose_residual(const Rig& rig, const SE3& T_world_body, const PoseMeasurement& m,

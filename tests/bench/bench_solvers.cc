@@ -2,6 +2,7 @@
 // points, 8 observations each; and the tracker's pose solver.   bench_solvers
 #include <benchmark/benchmark.h>
 
+#include "slam/solver/ceres_solver.h"
 #include "slam/tracking/pose_solver.h"
 #include "tests/solver/bundle_scene.h"
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "slam/solver/bundle_problem.h"
+#include "slam/solver/ceres_solver.h"
 #include "slam/solver/schur_solver.h"
 #include "tests/solver/bundle_scene.h"
 

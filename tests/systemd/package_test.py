@@ -17,7 +17,7 @@ FILES = {
     "usr/share/farpoint/cameras/README.md", "usr/share/farpoint/types/status_t.lcm",
     "usr/lib/systemd/system/farpointd.service", "usr/lib/sysusers.d/farpoint.conf", "usr/lib/tmpfiles.d/farpoint.conf",
     "usr/lib/udev/rules.d/60-farpoint.rules", "usr/lib/systemd/network/80-farpoint-lcm.network",
-    "usr/share/doc/farpoint/copyright", "usr/share/doc/farpoint/changelog.gz",
+    "usr/lib/farpoint/farpoint_ceres.so", "usr/share/doc/farpoint/copyright", "usr/share/doc/farpoint/changelog.gz",
     "usr/share/doc/farpoint/examples/80-farpoint-can.network",
 }
 

@@ -7,8 +7,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
+#include <vector>
 
+#include "ipc/image_encoder.h"
 #include "slam/geometry/se3.h"
 #include "tests/support/paths.h"
 
@@ -44,13 +45,12 @@ void replace_in(const fs::path& file, const std::string& from, const std::string
 }
 
 std::string make_image(const std::string& extension, int width_px, int height_px, int shade) {
-  cv::Mat image(height_px, width_px, CV_8UC1);
-  for (int y = 0; y < height_px; ++y) {
-    for (int x = 0; x < width_px; ++x)
-      image.at<unsigned char>(y, x) = static_cast<unsigned char>(x + y + shade);
-  }
-  std::vector<unsigned char> bytes;
-  cv::imencode(extension, image, bytes);
+  std::vector<unsigned char> pixels;
+  for (int y = 0; y < height_px; ++y)
+    for (int x = 0; x < width_px; ++x) pixels.push_back(static_cast<unsigned char>(x + y + shade));
+  constexpr int kQuality = 95;
+  const ipc::GreyPixels image{width_px, height_px, pixels};
+  const auto bytes = extension == ".png" ? ipc::encode_png(image) : ipc::encode_jpeg(image, kQuality);
   return {bytes.begin(), bytes.end()};
 }
 

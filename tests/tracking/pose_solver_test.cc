@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -241,6 +243,101 @@ TEST_F(PoseSolverTest, AllocatesNothing) {
   ASSERT_TRUE(s.ok);
   EXPECT_EQ(after - before, 0U);
   EXPECT_GT(before, 0U);  // the count works
+}
+
+// --- the prior
+// ---------------------------------------------------------------------------------------------------
+
+TEST_F(PoseSolverTest, PriorDerivativesMatchNumericDifferences) {
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 100; ++i) {
+    const SE3 prior = random_pose(), T = disturbed(prior, 0.5, i % 3 == 0 ? 1e-5 : 0.6);
+    Vector6d r, ahead, behind;
+    Matrix6d J, unused;
+    prior_residual(prior, T, &r, &J);
+    EXPECT_LT((prior.boxplus(r).boxminus_to(T)).norm(), 1e-12);
+    for (int k = 0; k < 6; ++k) {
+      const Vector6d step = kStep * Vector6d::Unit(k);
+      prior_residual(prior, T.boxplus(step), &ahead, &unused);
+      prior_residual(prior, T.boxplus(-step), &behind, &unused);
+      EXPECT_LT(((ahead - behind) / (2.0 * kStep) - J.col(k)).norm(), 1e-7) << i << " axis " << k;
+    }
+  }
+}
+
+TEST_F(PoseSolverTest, APriorWithoutInformationIsOnlyAStart) {
+  const SE3 truth = random_pose();
+  auto a = sightings(100, truth, {});
+  spoil(0.2, &a);
+  auto b = a;
+  PosePrior prior;
+  prior.T_world_body = disturbed(truth, 0.05, 0.01);
+  const PoseSolution first = solve_pose(rig, prior.T_world_body, a), second = solve_pose(rig, prior, b);
+  EXPECT_EQ(first.T_world_body.t, second.T_world_body.t);
+  EXPECT_EQ(first.T_world_body.q.coeffs(), second.T_world_body.q.coeffs());
+  EXPECT_EQ(first.covariance, second.covariance);
+}
+
+TEST_F(PoseSolverTest, ACertainPriorIsThePose) {
+  const SE3 truth = random_pose();
+  auto measurements = sightings(100, truth, {});
+  PosePrior prior;
+  prior.T_world_body = disturbed(truth, 0.002, 0.0003);  // within the gate of most measurements
+  prior.information = 1e14 * Matrix6d::Identity();
+  const PoseSolution s = solve_pose(rig, prior, measurements);
+  ASSERT_TRUE(s.ok);
+  EXPECT_LT(prior.T_world_body.boxminus_to(s.T_world_body).norm(), 1e-7);
+  EXPECT_LT(s.covariance.norm(), 1e-13);
+}
+
+TEST_F(PoseSolverTest, AVagueOneIsForgotten) {
+  const SE3 truth = random_pose();
+  auto with = sightings(100, truth, {});
+  auto without = with;
+  PosePrior prior;
+  prior.T_world_body = disturbed(truth, 0.05, 0.01);
+  prior.information = 1e-9 * Matrix6d::Identity();
+  const PoseSolution a = solve_pose(rig, prior, with), b = solve_pose(rig, prior.T_world_body, without);
+  ASSERT_TRUE(a.ok && b.ok);
+  EXPECT_LT(a.T_world_body.boxminus_to(b.T_world_body).norm(), 1e-6);
+}
+
+TEST_F(PoseSolverTest, InBetweenItIsTheMeanWeightedByInformation) {
+  for (int i = 0; i < 20; ++i) {
+    const SE3 truth = random_pose();
+    PointOptions exact;
+    exact.noise_px = 0.0;
+    auto measurements = sightings(60, truth, exact);
+    auto images_alone = measurements;
+    const PoseSolution images = solve_pose(rig, truth, images_alone);
+    ASSERT_TRUE(images.ok);
+    const Matrix6d information_of_images = images.covariance.inverse();
+    PosePrior prior;
+    // A tenth of the images' sigma away, so that everything is linear.
+    Vector6d away = 0.1 * images.covariance.diagonal().cwiseSqrt();
+    prior.T_world_body = truth.boxplus(away);
+    prior.information = information_of_images.diagonal().asDiagonal();
+    const PoseSolution s = solve_pose(rig, prior, measurements);
+    ASSERT_TRUE(s.ok);
+    const Matrix6d sum = information_of_images + prior.information;
+    const Vector6d expected = sum.ldlt().solve(prior.information * away);
+    EXPECT_LT((truth.boxminus_to(s.T_world_body) - expected).norm(), 0.02 * expected.norm()) << i;
+    EXPECT_LT((s.covariance - sum.inverse()).norm(), 0.02 * sum.inverse().norm()) << i;
+  }
+}
+
+TEST_F(PoseSolverTest, WithAPriorAllocatesNothing) {
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
+  const SE3 truth = random_pose();
+  auto measurements = sightings(100, truth, {});
+  PosePrior prior;
+  prior.T_world_body = truth;
+  prior.information = 100.0 * Matrix6d::Identity();
+  const auto before = test::allocations();
+  const PoseSolution s = solve_pose(rig, prior, measurements);
+  const auto after = test::allocations();
+  ASSERT_TRUE(s.ok);
+  EXPECT_EQ(after - before, 0U);
 }
 
 // --- the covariance

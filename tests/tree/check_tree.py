@@ -33,7 +33,9 @@ ALLOWED = {
 OPTIONS = "slam/config.h"
 # The names of the stages that the parts announce to a listener.
 STAGES = "slam/stages.h"
-SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set()}
+# The measurements that come in: the facade takes them, fusion turns them into factors.
+MEASUREMENTS = "slam/measurement.h"
+SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set(), MEASUREMENTS: {"slam/geometry"}}
 # The tools read camera files and refuse input as the daemon does, and speak with it.
 SHARED_WITH_TOOLS = {"daemon/config/errors.h", "daemon/config/yaml_file.h", "daemon/config/camera_file.h",
                      "daemon/config/calibration_message.h", "daemon/system/control_socket.h"}

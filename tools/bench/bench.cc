@@ -8,6 +8,7 @@
 
 #include "daemon/config/rig.h"
 #include "daemon/input/log_frame_source.h"
+#include "daemon/system/solver_loader.h"
 #include "slam/estimator.h"
 #include "tools/common/errors.h"
 
@@ -77,11 +78,13 @@ BenchPass run_pass(const BenchOptions& options, const daemon::Config& config,
 
 }  // namespace
 
-BenchReport run_bench(const BenchOptions& options, const daemon::Config& config,
+BenchReport run_bench(const BenchOptions& options, const daemon::Config& given,
                       const BenchProgress& progress) {
   cv::setNumThreads(1);
   std::vector<BenchPass> passes;
+  daemon::Config config = given;
   try {
+    daemon::load_solver(daemon::ceres_module_path(), &config.estimator.mapping);
     const std::size_t most = 2 * options.passes;
     while (passes.size() < options.passes ||
            (passes.size() < most && !enough_calm_passes(passes, options.passes))) {
@@ -89,6 +92,8 @@ BenchReport run_bench(const BenchOptions& options, const daemon::Config& config,
       passes.push_back(run_pass(options, config, [&](double share) { progress(number, share); }));
     }
   } catch (const daemon::InputError& error) {
+    throw InputError(error.what());
+  } catch (const daemon::ConfigError& error) {
     throw InputError(error.what());
   } catch (const std::invalid_argument& error) {
     throw InputError(options.log + ": " + error.what());

@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "ipc/channels.h"
 #include "ipc/image_codec.h"
+#include "ipc/image_encoder.h"
 #include "ipc/log.h"
 #include "tools/report/html.h"
 #include "tools/report/sections.h"
@@ -76,11 +75,7 @@ std::map<std::int64_t, ipc::GreyImage> images_at(const std::filesystem::path& re
 }
 
 std::vector<std::uint8_t> to_jpeg(const ipc::GreyImage& image) {
-  const cv::Mat grey(image.height_px, image.width_px, CV_8UC1,
-                     const_cast<std::uint8_t*>(image.pixels.data()));
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, 80});
-  return bytes;
+  return ipc::encode_jpeg({image.width_px, image.height_px, image.pixels}, 80);
 }
 
 // Every track twice: a dark line under a light one is seen on any ground.

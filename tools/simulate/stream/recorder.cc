@@ -2,11 +2,12 @@
 
 #include <cstdio>
 #include <ctime>
+#include <fstream>
 #include <memory>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
+#include <vector>
 
 #include "ipc/channels.h"
+#include "ipc/image_encoder.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
@@ -60,10 +61,10 @@ class Recorder {
   bool write_image(std::int64_t frame, int camera) {
     simulation_.take_image(frame, camera, &image_);
     image_t message = grey_message(simulation_, frame, camera, image_);
-    const cv::Mat grey(message.height, message.width, CV_8UC1, image_.grey.data());
+    const ipc::GreyPixels grey{message.width, message.height, image_.grey};
     if (options_.format == ImageFormat::kMjpeg) {
       constexpr int kQuality = 92;  // about what cameras with MJPEG do
-      cv::imencode(".jpg", grey, message.data, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+      message.data = ipc::encode_jpeg(grey, kQuality);
       message.pixel_format = image_t::PIXEL_FORMAT_MJPEG;
       message.row_stride = 0;
       message.size = static_cast<std::int32_t>(message.data.size());
@@ -73,11 +74,14 @@ class Recorder {
     return log_.write_message(ipc::kCameraChannelPrefix + std::to_string(camera), message.utime, message);
   }
 
-  void write_picture(std::int64_t frame, const cv::Mat& grey) const {
+  void write_picture(std::int64_t frame, const ipc::GreyPixels& grey) const {
     char name[32];
     std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(frame));
     const std::filesystem::path file = options_.picture_folder / name;
-    if (!cv::imwrite(file.string(), grey)) throw RunError(file.string() + ": cannot be written");
+    const std::vector<std::uint8_t> bytes = ipc::encode_png(grey);
+    std::ofstream out(file, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!out.flush()) throw RunError(file.string() + ": cannot be written");
   }
 
   Simulation& simulation_;
