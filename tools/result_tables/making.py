@@ -1,0 +1,75 @@
+"""Runs the commands of a table and keeps what they print."""
+
+import concurrent.futures
+import json
+import pathlib
+import subprocess
+import tempfile
+import time
+
+from . import figures, store
+from .progress import Progress
+
+
+def run(command, folder, keep_stderr):
+    done = subprocess.run(command, shell=True, cwd=folder, text=True, check=False, stdout=subprocess.PIPE,
+                          stderr=None if keep_stderr else subprocess.PIPE)
+    if done.returncode != 0:
+        said = (done.stderr or "").strip().splitlines()[-1:] or ["no message"]
+        raise store.ResultsError(f"status {done.returncode} of '{command}': {said[0]}")
+    return done.stdout
+
+
+def make_row(table, row, places):
+    """What the last command of the row prints. compare_modes draws a bar of its own, so its standard error stays."""
+    with tempfile.TemporaryDirectory(prefix="farpoint_results_") as name:
+        for command in row.commands:
+            command = command.format(**places)
+            if command.startswith("tools/compare_modes"):
+                command = f"{places['root']}/{command} --bin {places['bin']}"
+            printed = run(command, pathlib.Path(name), table.kind == "pairs")
+    return KEEP[table.kind](json.loads(printed))
+
+
+KEEP = {
+    "accuracy": lambda printed: figures.repeatable(printed["runs"][0]),
+    "scenes": lambda printed: {key: printed["scenes"][0][key] for key in ("abs_z_p95", "pairs")},
+    "pairs": lambda printed: {"pairs": printed["pairs"]},
+    "bench": lambda printed: printed,
+}
+
+
+def make(table, programs, data, jobs):
+    """The result of a table, ready to be saved."""
+    places = {"bin": programs, "data": data, "root": store.ROOT, "jobs": f" --jobs {jobs}"}
+    commit, start = store.built_commit(programs), time.monotonic()
+    refuse_unnamed_build(table, commit)
+    progress = Progress(len(table.rows), table.name)
+
+    def one(row):
+        values = make_row(table, row, places)
+        progress.step()
+        return values
+
+    with concurrent.futures.ThreadPoolExecutor(1 if table.timed or table.kind == "pairs" else jobs) as pool:
+        rows = dict(zip([row.label for row in table.rows], pool.map(one, table.rows)))
+    progress.close()
+    return {"table": table.name, "made": store.made(table, commit, time.monotonic() - start), "rows": rows}
+
+
+def refuse_unnamed_build(table, commit):
+    """A result names the commit it was made at: the build's inputs must be those of a commit."""
+    if commit.endswith("-dirty") or commit == "unknown":
+        raise store.ResultsError(f"{table.name}: the build is of {commit}; commit first, then build again")
+
+
+def differences(before, after, path=""):
+    """Dotted paths of what differs, exactly."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        for key in sorted(set(before) | set(after)):
+            yield from differences(before.get(key), after.get(key), f"{path}.{key}" if path else key)
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for number, (old, new) in enumerate(zip(before, after)):
+            yield from differences(old, new, f"{path}[{number}]")
+    elif before != after:
+        yield f"{path}: {before} in the file, {after} now"
