@@ -1,5 +1,5 @@
 """Every table of tests/RESULTS.md with the commands that make it. In commands {bin} is the build's folder of programs,
-{data} the folder of recordings, {jobs} an option; each row runs in a folder of its own, and its last command prints JSON.
+{data} the folder of recordings, {jobs} an option. Each row runs in a folder of its own; its last command prints JSON.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,8 @@ TABLES = (
                   " --segments 0:70,110:400"),
         recording("Karlsruhe 0019, half, 98 m", "kitti {data}/karlsruhe 2010_03_09_0019", "0.93 .. 0.94"),
         recording("EuRoC MH_01, part, camera 0", "euroc {data}/euroc/MH_01_part", "0.0058 .. 0.0061"),
-        recording("TUM fr1_rpy, part", "tum {data}/tum/freiburg1_rpy_part --camera {root}/config/cameras/tum-freiburg1.yaml",
+        recording("TUM fr1_rpy, part",
+                  "tum {data}/tum/freiburg1_rpy_part --camera {root}/config/cameras/tum-freiburg1.yaml",
                   "0.016 .. 0.017 over 27 .. 40 %"),
     ), (*ESTIMATOR, "tools/import", "tools/evaluate"), long=True),
     Table("scenes", "scenes", (
@@ -79,6 +80,9 @@ TABLES = (
     world("highway", "620x188", 30),
     world("valley", "480x270", 40),
     world("hover", "376x240", 40),
+    by_hand("world_landmarks", *[f"tools/compare_modes world {name} --seeds 1-5 --duration {duration}"
+                                 for name, duration in (("town", 30), ("highway", 30), ("valley", 40), ("hover", 40))],
+            timed=False),
     Table("bench", "bench", (Row("KITTI 03, first half", (
         "{bin}/farpoint import kitti {data}/kitti 03 -o run.lcm", "{bin}/farpoint bench run.lcm --json")),),
         (*ESTIMATOR, "daemon"), timed=True),

@@ -103,8 +103,9 @@ def age(table, result, today=None, root=ROOT):
             reasons.append(f"{', '.join(changed)} changed{commits_since(result['made'], changed, root)}")
     if not reasons:
         return None
-    days = ((today or datetime.date.today()) - datetime.date.fromisoformat(result["made"]["date"])).days
-    return (f"{table.name}: made {days} day{'' if days == 1 else 's'} ago at {result['made']['commit'][:7]}, since then "
+    head = result["made"]
+    days = ((today or datetime.date.today()) - datetime.date.fromisoformat(head["date"])).days
+    return (f"{table.name}: made {days} day{'' if days == 1 else 's'} ago at {head['commit'][:7]}, since then "
             + " and ".join(reasons))
 
 
