@@ -4,6 +4,7 @@
 usage: results_test.py SOURCE_FOLDER
 """
 
+import contextlib
 import datetime
 import importlib.machinery
 import importlib.util
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 ROOT = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else __file__).resolve()
 ROOT = ROOT if ROOT.is_dir() else ROOT.parents[2]
@@ -118,6 +120,18 @@ class Rendering(unittest.TestCase):
         result["made"]["carried_over"] = "by hand from README"
         self.assertIn("Made at `0123456`, 2026-11-20; carried over by hand from README.\n\n| a | b |\n|---|---|\n| 1 | 2 |",
                       render.block(table, result))
+
+
+class Headline(unittest.TestCase):
+    def test_it_has_four_figures_each_with_its_commit(self):
+        results = {table.name: store.load(table.name, ROOT / "tests" / "results") for table in manifest.TABLES}
+        rows = render.headline(results).splitlines()[2:]
+        self.assertEqual(len(rows), 4)
+        for row in rows:
+            self.assertRegex(row, r"^\| .* \| .*\d.* \| `\w+`, `[0-9a-f]{7}` \|$")
+
+    def test_a_table_that_is_not_made_leaves_it_out(self):
+        self.assertNotIn("headline", render.blocks({table.name: None for table in manifest.TABLES}))
 
 
 class Check(unittest.TestCase):
@@ -254,6 +268,46 @@ class Making(unittest.TestCase):
     def test_a_build_of_no_commit_is_refused(self):
         with self.assertRaises(store.ResultsError):
             making.refuse_unnamed_build(manifest.TABLES[0], "0123456789ab-dirty")
+
+
+class CheckLong(unittest.TestCase):
+    """A table that is made again, by programs that only print."""
+
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        daemon = self.folder / "farpointd"
+        daemon.write_text("#!/bin/sh\necho farpointd 0.1.0 0123456789ab gcc Release\n")
+        daemon.chmod(0o755)
+        self.table = manifest.Table("t", "bench", (manifest.Row("r", ("echo '{\"ate_m\": 0.206}'",)),), long=True)
+        self.results = script("results")
+
+    def findings(self, ate_m, simd=None, table_changes=()):
+        result = making.make(self.table, self.folder, "", 1)
+        result["rows"]["r"]["ate_m"] = ate_m
+        result["made"].update(table_changes)
+        if simd:
+            result["made"]["machine"]["simd"] = simd
+        store.save(result, self.folder)
+        o = self.results.options(["--check", "--long", "--bin", str(self.folder)])
+        with unittest.mock.patch.object(manifest, "TABLES", (self.table,)), \
+                contextlib.redirect_stdout(io.StringIO()) as printed:
+            return list(self.results.check_again(o, self.folder)), printed.getvalue()
+
+    def test_the_same_figures_are_no_finding(self):
+        self.assertEqual(self.findings(0.206), ([], "t: every figure is the same again\n"))
+
+    def test_another_last_digit_is(self):
+        self.assertEqual(self.findings(0.2060000001)[0], ["t: r.ate_m: 0.2060000001 in the file, 0.206 now"])
+
+    def test_another_instruction_set_is_not_compared_and_said(self):
+        findings, printed = self.findings(0.3, "another")
+        self.assertEqual(findings, [])
+        self.assertIn("t: not compared: made with another", printed)
+
+    def test_a_carried_table_is_a_finding(self):
+        self.assertEqual(len(self.findings(0.206, table_changes={"carried_over": "by hand"})[0]), 1)
 
 
 class Manifest(unittest.TestCase):

@@ -20,11 +20,17 @@ def run(command, folder, keep_stderr):
     return done.stdout
 
 
+def filled(command, places):
+    for name, text in places.items():
+        command = command.replace(f"{{{name}}}", str(text))
+    return command
+
+
 def make_row(table, row, places):
     """What the last command of the row prints. compare_modes draws a bar of its own, so its standard error stays."""
     with tempfile.TemporaryDirectory(prefix="farpoint_results_") as name:
         for command in row.commands:
-            command = command.format(**places)
+            command = filled(command, places)
             if command.startswith("tools/compare_modes"):
                 command = f"{places['root']}/{command} --bin {places['bin']}"
             printed = run(command, pathlib.Path(name), table.kind == "pairs")

@@ -90,7 +90,10 @@ TABLES = (
     by_hand("gaps", "{bin}/test_replay --gtest_filter='*RecordedGapsLong*'", timed=False),
     by_hand("threads", "{bin}/test_replay --gtest_filter='RecordedThreadsLong.*'",
             "{bin}/farpointd --replay run.lcm --speed 1 --output out.lcm", inputs=(*ESTIMATOR, "daemon")),
-    by_hand("memory", "{bin}/test_replay --gtest_filter='RecordedEndlessLong.*'",
+    by_hand("memory", "{bin}/farpointd --replay run.lcm --lockstep --output out.lcm",
+            "{bin}/farpointd --replay run.lcm --speed 1 --output locked.lcm",
+            "{bin}/farpoint evaluate out.lcm locked.lcm --truth run.lcm --json",
+            "{bin}/test_replay --gtest_filter='RecordedEndlessLong.*'",
             "{bin}/test_scenes --gtest_filter='EndlessLong.*'", inputs=(*ESTIMATOR, "daemon")),
     by_hand("beside_load", "{bin}/farpoint simulate endless30.yaml -o endless30.lcm --size 320x240 --duration 605",
             "{bin}/farpointd --replay endless30.lcm --speed 1 --output out.lcm --set realtime.capture_priority=40 "

@@ -141,7 +141,7 @@ def block(table, result):
 def headline(results):
     """The four figures of README.md."""
     def at(name):
-        return f"`tools/results --only {name}`, `{results[name]['made']['commit'][:7]}`"
+        return f"`{name}`, `{results[name]['made']['commit'][:7]}`"
 
     drive = find("recordings").rows[0]
     kitti = results["recordings"]["rows"][drive.label]["final"]
@@ -149,7 +149,7 @@ def headline(results):
     depths = [statistics.median(figures.p90_depth_m(pair[mode]) for pair in far) for mode in MODES]
     tracking = next(cells for cells in bench_cells(results["bench"]) if cells[0].startswith("tracking"))
     memory = next(iter(results["memory"]["rows"].values()))["cells"][0]
-    return grid(["what", "figure", "made again by; commit"], [
+    return grid(["what", "figure", "table, commit"], [
         [f"RMS position error, {drive.label}, {100 * kitti['share']:.0f} % of the frames, aligned by scale",
          f"{metres(kitti['ate_rmse_m'])} m; ORB-SLAM3 {drive.given.replace('..', 'to')} m", at("recordings")],
         ["p90 depth of new points with virtual map points against without, same drive, 15 starts",
