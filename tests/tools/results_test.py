@@ -270,21 +270,64 @@ class Making(unittest.TestCase):
             making.refuse_unnamed_build(manifest.TABLES[0], "0123456789ab-dirty")
 
 
-class CheckLong(unittest.TestCase):
-    """A table that is made again, by programs that only print."""
+class WithDaemon(unittest.TestCase):
+    """A folder of programs whose farpointd only names its commit."""
 
     def setUp(self):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
+        self.daemon_of("0123456789ab")
+
+    def daemon_of(self, commit):
         daemon = self.folder / "farpointd"
-        daemon.write_text("#!/bin/sh\necho farpointd 0.1.0 0123456789ab gcc Release\n")
+        daemon.write_text(f"#!/bin/sh\necho farpointd 0.1.0 {commit} gcc Release\n")
         daemon.chmod(0o755)
+
+
+class Interrupted(WithDaemon):
+    def setUp(self):
+        super().setUp()
+        self.ran = self.folder / "ran"
+        self.table = manifest.Table("t", "bench", (
+            manifest.Row("a", (f"echo a >> {self.ran}; echo 1",)),
+            manifest.Row("b", (f"test -e {self.folder}/ready && echo 2",))))
+
+    def make(self):
+        return making.make(self.table, self.folder, "", 1, self.folder)
+
+    def test_finished_rows_are_not_run_again(self):
+        with self.assertRaises(store.ResultsError):
+            self.make()
+        (self.folder / "ready").touch()
+        self.assertEqual(self.make()["rows"], {"a": 1, "b": 2})
+        self.assertEqual(self.ran.read_text(), "a\n")
+
+    def test_rows_of_another_build_are(self):
+        with self.assertRaises(store.ResultsError):
+            self.make()
+        (self.folder / "ready").touch()
+        self.daemon_of("ba9876543210")
+        self.make()
+        self.assertEqual(self.ran.read_text(), "a\na\n")
+
+    def test_a_finished_table_starts_anew(self):
+        (self.folder / "ready").touch()
+        self.make()
+        self.make()
+        self.assertEqual(self.ran.read_text(), "a\na\n")
+
+
+class CheckLong(WithDaemon):
+    """A table that is made again, by a command that only prints."""
+
+    def setUp(self):
+        super().setUp()
         self.table = manifest.Table("t", "bench", (manifest.Row("r", ("echo '{\"ate_m\": 0.206}'",)),), long=True)
         self.results = script("results")
 
     def findings(self, ate_m, simd=None, table_changes=()):
-        result = making.make(self.table, self.folder, "", 1)
+        result = making.make(self.table, self.folder, "", 1, self.folder)
         result["rows"]["r"]["ate_m"] = ate_m
         result["made"].update(table_changes)
         if simd:

@@ -2,13 +2,18 @@
 
 import concurrent.futures
 import json
+import os
 import pathlib
 import subprocess
 import tempfile
+import threading
 import time
 
 from . import figures, store
 from .progress import Progress
+
+
+PARTIAL = store.ROOT / "build" / "results"
 
 
 def run(command, folder, keep_stderr):
@@ -45,22 +50,60 @@ KEEP = {
 }
 
 
-def make(table, programs, data, jobs):
-    """The result of a table, ready to be saved."""
+def make_rows(table, programs, data, jobs, known=None):
+    """Figures of each row; those in `known` are not made again."""
     places = {"bin": programs, "data": data, "root": store.ROOT, "jobs": f" --jobs {jobs}"}
-    commit, start = store.built_commit(programs), time.monotonic()
-    refuse_unnamed_build(table, commit)
+    known = known or Finished(None, table)
     progress = Progress(len(table.rows), table.name)
 
     def one(row):
-        values = make_row(table, row, places)
+        if row.label not in known.rows:
+            begun = time.monotonic()
+            known.add(row, make_row(table, row, places), time.monotonic() - begun)
         progress.step()
-        return values
+        return known.rows[row.label]["values"]
 
     with concurrent.futures.ThreadPoolExecutor(1 if table.timed or table.kind == "pairs" else jobs) as pool:
         rows = dict(zip([row.label for row in table.rows], pool.map(one, table.rows)))
     progress.close()
-    return {"table": table.name, "made": store.made(table, commit, time.monotonic() - start), "rows": rows}
+    return rows
+
+
+def make(table, programs, data, jobs, partial=PARTIAL):
+    """The result of a table, ready to be saved. Rows that an interrupted run of the same build finished are not run
+    again; delete the folder build/results to forget them."""
+    commit = store.built_commit(programs)
+    refuse_unnamed_build(table, commit)
+    known = Finished(partial / f"{table.name}.{commit}.json", table)
+    rows = make_rows(table, programs, data, jobs, known)
+    known.forget()
+    return {"table": table.name, "made": store.made(table, commit, known.seconds()), "rows": rows}
+
+
+class Finished:
+    """Rows of a table that is being made, kept in a file beside the build; without a path in memory only."""
+
+    def __init__(self, path, table):
+        self.path, self.lock = path, threading.Lock()
+        saved = json.loads(path.read_text()) if path and path.is_file() else {}
+        self.commands = table.commands
+        self.rows = saved["rows"] if saved.get("commands") == self.commands else {}
+
+    def add(self, row, values, seconds):
+        with self.lock:
+            self.rows[row.label] = {"values": values, "seconds": seconds}
+            if self.path is None:
+                return
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            scratch = self.path.with_suffix(".new")
+            scratch.write_text(json.dumps({"commands": self.commands, "rows": self.rows}))
+            os.replace(scratch, self.path)
+
+    def seconds(self):
+        return sum(row["seconds"] for row in self.rows.values())
+
+    def forget(self):
+        self.path.unlink(missing_ok=True)
 
 
 def refuse_unnamed_build(table, commit):
