@@ -1,8 +1,9 @@
-// Virtual map points against the baseline over simulated scenes, paired seed by seed.
+// Compares virtual map points with the baseline over simulated scenes, paired seed by seed.
 //   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--init-parallax
 //   RAD]
-//               [--align-bias PX] [--focal-error SHARE] [--markdown] [--verbose]
-// The figures in the README come from `sim_compare --seeds 20 --scene all --markdown`.
+//               [--align-bias PX] [--focal-error SHARE] [--markdown | --json] [--verbose]
+// --json prints one object with the figures of every seed and no times: equal builds print equal bytes.
+// tools/results runs it for tests/RESULTS.md.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -12,9 +13,12 @@
 #include <vector>
 
 #include "tests/scenes/evaluation.h"
+#include "tools/common/json.h"
 
 namespace farpoint::sim {
 namespace {
+
+using tools::Json;
 
 struct Options {
   int seeds = 20;
@@ -24,11 +28,7 @@ struct Options {
   int features = 0;
   double init_parallax_rad = 0;  // 0: the configuration's
   double align_bias_px = 0, focal_error = 0;
-  bool markdown = false, verbose = false;
-};
-
-struct Pair {
-  RunReport baseline, vmp;
+  bool markdown = false, json = false, verbose = false;
 };
 
 Options parse(int argc, char** argv) {
@@ -57,12 +57,15 @@ Options parse(int argc, char** argv) {
       o.focal_error = std::atof(value());
     else if (key == "--markdown")
       o.markdown = true;
+    else if (key == "--json")
+      o.json = true;
     else if (key == "--verbose")
       o.verbose = true;
     else
-      throw std::invalid_argument(key +
-                                  ": unknown; expected --seeds, --first, --scene, --frames, --features, "
-                                  "--init-parallax, --align-bias, --focal-error, --markdown or --verbose");
+      throw std::invalid_argument(
+          key +
+          ": unknown; expected --seeds, --first, --scene, --frames, --features, "
+          "--init-parallax, --align-bias, --focal-error, --markdown, --json or --verbose");
   }
   if (o.seeds < 1) throw std::invalid_argument("--seeds: at least 1 was expected");
   return o;
@@ -121,6 +124,7 @@ struct Row {
   std::vector<double> ratio, depth_ratio;
   std::vector<double> ate[2], p90[2], beyond50[2], beyond100[2], vmp[2], z[2], posed[2], ms[2];
   int failed = 0;
+  Json::Array seeds;  // figures of each, for --json
 };
 
 void add(const RunReport& r, int mode, Row* row) {
@@ -133,6 +137,31 @@ void add(const RunReport& r, int mode, Row* row) {
   row->ms[mode].push_back(1e3 * r.seconds / r.frames);
   const std::vector<double> z = normalised(r, false);
   row->z[mode].insert(row->z[mode].end(), z.begin(), z.end());
+}
+
+// Named as in farpoint evaluate --json.
+Json figures(const RunReport& r) {
+  Json json = Json::object(), final = Json::object(), live = Json::object(), depth = Json::object();
+  final.set("ate_rmse_m", r.aligned ? Json(r.ate_m) : Json());
+  final.set("share", static_cast<double>(r.posed_frames) / r.frames);
+  live.set("share", static_cast<double>(r.valid_frames) / r.frames);
+  depth.set("p90", quantile(r.creation_depths_m, 0.9));
+  json.set("final", final);
+  json.set("live", live);
+  json.set("triangulation_depth_m", depth);
+  json.set("depth_over_50_m_percent", 100 * r.creation_share_beyond(50));
+  json.set("depth_over_100_m_percent", 100 * r.creation_share_beyond(100));
+  json.set("vmp_percent", 100 * r.vmp_share());
+  return json;
+}
+
+void add_seed(std::uint64_t seed, bool compared, const RunReport& baseline, const RunReport& vmp, Row* row) {
+  Json json = Json::object();
+  json.set("start", static_cast<std::int64_t>(seed));
+  json.set("compared", compared);
+  json.set("baseline", figures(baseline));
+  json.set("vmp", figures(vmp));
+  row->seeds.push_back(json);
 }
 
 // Compared only where both have most of the drive, from where it moves, in one map.
@@ -153,7 +182,10 @@ Row compare(const Options& o, const Scene& scene) {
     if (o.verbose) print_run("baseline", seed, baseline), print_run("vmp", seed, vmp);
     add(baseline, 0, &row), add(vmp, 1, &row);
     const double enough = kEnoughPosed * (scene.frames - scene.still_frames);
-    if (!baseline.aligned || !vmp.aligned || baseline.posed_frames < enough || vmp.posed_frames < enough) {
+    const bool compared =
+        baseline.aligned && vmp.aligned && baseline.posed_frames >= enough && vmp.posed_frames >= enough;
+    add_seed(seed, compared, baseline, vmp, &row);
+    if (!compared) {
       ++row.failed;
       continue;
     }
@@ -189,20 +221,36 @@ void print_row(const Options& o, const std::string& name, const Row& r) {
   std::fflush(stdout);
 }
 
+// |z|: error of a depth over its claimed sigma, all landmarks of all seeds.
+Json scene_json(const std::string& name, const Row& row) {
+  Json json = Json::object(), z = Json::object();
+  z.set("baseline", quantile(magnitude(row.z[0]), 0.95));
+  z.set("vmp", quantile(magnitude(row.z[1]), 0.95));
+  json.set("scene", name);
+  json.set("abs_z_p95", z);
+  json.set("pairs", row.seeds);
+  return json;
+}
+
 int run(const Options& o) {
   std::vector<std::string> names;
   for (const std::string& name : scene_names())
     if (o.scene == name || (o.scene == "all" && make_scene(name).far)) names.push_back(name);
   if (names.empty()) names.push_back(o.scene);
-  print_header(o.markdown);
+  if (!o.json) print_header(o.markdown);
+  Json::Array scenes;
   for (const std::string& name : names) {
     Scene scene = make_scene(name);
     if (o.frames > 0) scene.frames = o.frames;
     if (o.features > 0) scene.features = o.features;
     scene.noise.align_bias_px = o.align_bias_px;
     scene.focal_error = o.focal_error;
-    print_row(o, name, compare(o, scene));
+    const Row row = compare(o, scene);
+    o.json ? scenes.push_back(scene_json(name, row)) : print_row(o, name, row);
   }
+  Json all = Json::object();
+  all.set("scenes", scenes);
+  if (o.json) std::printf("%s\n", all.dump().c_str());
   return 0;
 }
 

@@ -1,0 +1,25 @@
+"""What of `farpoint evaluate --json` is kept. Measured times and memory are left out: all that stays is the same in
+each lockstep replay of one log."""
+
+RUN_KEYS = ("images", "resets", "times_lost", "maps", "map_points", "vmp_percent", "triangulation_depth_m",
+            "depth_over_50_m_percent", "depth_over_100_m_percent", "landmarks", "segments")
+TRAJECTORY_KEYS = ("n", "share", "path_m", "scale", "ate_rmse_m", "rpe_1s_translation_m", "rpe_1s_rotation_deg")
+
+
+def repeatable(run):
+    kept = {key: run.get(key) for key in RUN_KEYS}
+    for part in ("final", "live"):
+        kept[part] = {key: (run.get(part) or {}).get(key) for key in TRAJECTORY_KEYS}
+    return kept
+
+
+def final_ate_m(run):
+    return run["final"]["ate_rmse_m"]
+
+
+def p90_depth_m(run):
+    return (run["triangulation_depth_m"] or {}).get("p90")
+
+
+def live_share(run):
+    return run["live"]["share"]

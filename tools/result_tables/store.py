@@ -1,0 +1,114 @@
+"""Results as JSON files of tests/results: one a table, with what they were made from."""
+
+import datetime
+import json
+import os
+import pathlib
+import platform
+import re
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "tests" / "results"
+
+
+class ResultsError(Exception):
+    """One line for the user."""
+
+
+def git(*words, root=ROOT):
+    """Output of git; None where it fails or is absent."""
+    try:
+        done = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def load(name, folder=FOLDER):
+    path = folder / f"{name}.json"
+    return json.loads(path.read_text()) if path.is_file() else None
+
+
+def save(result, folder=FOLDER):
+    """Replaces the file through a rename: an interrupted run leaves the old one."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{result['table']}.json"
+    scratch = path.with_suffix(".json.new")
+    scratch.write_text(dump(result))
+    os.replace(scratch, path)
+
+
+def dump(result):
+    """One line a row or pair, so that a diff shows which changed."""
+    lines = []
+    for name, values in result["rows"].items():
+        text = json.dumps(values)
+        if "pairs" in values:
+            rest = json.dumps({key: value for key, value in values.items() if key != "pairs"})
+            opening = "{" if rest == "{}" else rest[:-1] + ", "
+            text = opening + '"pairs": [\n' + ",\n".join(json.dumps(pair) for pair in values["pairs"]) + "]}"
+        lines.append(f"{json.dumps(name)}: {text}")
+    head = json.dumps({key: value for key, value in result.items() if key != "rows"}, indent=1)
+    return head[:-2] + ',\n "rows": {\n' + ",\n".join(lines) + "\n}}\n"
+
+
+def machine(cpuinfo=pathlib.Path("/proc/cpuinfo")):
+    text = cpuinfo.read_text() if cpuinfo.is_file() else ""
+    model = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
+    flags = set((re.search(r"^(?:flags|Features)\s*: (.*)$", text, re.MULTILINE) or [0, ""])[1].split())
+    wide = "AVX-512" if "avx512bw" in flags else "AVX2" if "avx2" in flags else "SSE" if "sse2" in flags else "NEON"
+    return {"cpu": model.group(1) if model else platform.machine(), "cores": os.cpu_count(), "simd": wide}
+
+
+def input_hashes(inputs, commit="HEAD", root=ROOT):
+    """Git's hash of each file or folder at the commit; None for one that was not there."""
+    return {path: git("rev-parse", "--verify", "--quiet", f"{commit}:{path}", root=root) for path in inputs}
+
+
+def built_commit(programs):
+    """The commit that the programs of a folder were built from, as farpointd says it."""
+    daemon = programs / "farpointd"
+    if not daemon.is_file():
+        raise ResultsError(f"{daemon}: no such program; expected a build (cmake --build --preset release)")
+    words = subprocess.run([str(daemon), "--version"], capture_output=True, text=True, check=True).stdout.split()
+    return words[2] if len(words) > 2 else "unknown"
+
+
+def made(table, commit, seconds):
+    return {"commit": git("rev-parse", "--verify", "--quiet", commit) or commit,
+            "date": datetime.date.today().isoformat(),
+            "configuration": git("rev-parse", "--short=12", f"{commit}:config/farpoint.yaml"),
+            "machine": machine(), "seconds": round(seconds), "commands": table.commands,
+            "inputs": input_hashes(table.inputs, commit)}
+
+
+def changed_inputs(table, result, root=ROOT):
+    """Inputs of the table that are not those it was made from, uncommitted changes included."""
+    before, now = result["made"]["inputs"], input_hashes(table.inputs, root=root)
+    return [path for path in table.inputs
+            if now[path] != before.get(path) or git("status", "--porcelain", "--", path, root=root)]
+
+
+def age(table, result, today=None, root=ROOT):
+    """One line: why and since when the table is old. None for one that is up to date."""
+    if result is None:
+        return f"{table.name}: not made yet"
+    reasons = []
+    if result["made"]["commands"] != table.commands:
+        reasons.append("its command changed")
+    if git("rev-parse", "HEAD", root=root) is not None:
+        changed = changed_inputs(table, result, root)
+        if changed:
+            reasons.append(f"{', '.join(changed)} changed{commits_since(result['made'], changed, root)}")
+    if not reasons:
+        return None
+    head = result["made"]
+    days = ((today or datetime.date.today()) - datetime.date.fromisoformat(head["date"])).days
+    return (f"{table.name}: made {days} day{'' if days == 1 else 's'} ago at {head['commit'][:7]}, since then "
+            + " and ".join(reasons))
+
+
+def commits_since(head, paths, root=ROOT):
+    count = git("rev-list", "--count", f"{head['commit']}..HEAD", "--", *paths, root=root)
+    return f" in {count} commit{'' if count == '1' else 's'}" if count not in (None, "0") else ""
