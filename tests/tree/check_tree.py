@@ -102,7 +102,7 @@ def include_problem(path: str, target: str):
     shared = target in SHARED_MAY_INCLUDE and folder in SHARED_READERS
     shared = shared or (target in SHARED_WITH_TOOLS and folder == "tools")
     if other != folder and other not in allowed and not shared:
-        return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'nothing but itself'}"
+        return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'only itself'}"
     return None
 
 

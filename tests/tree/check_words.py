@@ -31,7 +31,7 @@ PHRASES = [
     (r"so many|so often|so long as it", "N, and name it"),
     (r"(?:is|are|was|be|being) told(?: of| apart| to)?|told of|that is told", "receives, is distinguished, is reported"),
     (OBJECT + r" (?:does not |do not |did not |must not |need not |may |cannot |to )?"
-     r"(?:know|knows|want|wants|hear|hears|like|likes|believe|believes|speak|speaks)", "objects hold, need, receive"),
+     r"(?:know|knows|want|wants|hear|hears|likes|believe|believes|speak|speaks)", "objects hold, need, receive"),
     (r"in (?:the |its )?(?:hands|eyes) of|'s hands", "in use by, owned by"),
     (r"(?:has|have|had) (?:no|a|the|its|their) say", "weighs, has no weight"),
     (r"(?:bears?|bore|borne|bearing) (?:it |them |this )?out", "confirms"),

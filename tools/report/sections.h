@@ -1,4 +1,4 @@
-// The parts of a report, each as HTML; empty where the runs say nothing about it.
+// The parts of a report, each as HTML; empty without data in the runs.
 #pragma once
 
 #include <filesystem>

@@ -7,7 +7,7 @@
 
 namespace farpoint::tools::simulate {
 
-// Keeps what there is as <file>.incomplete, and says so to go on in an error's message; empty where nothing
+// Keeps what there is as <file>.incomplete, and returns a text for an error's message; empty where nothing
 // is kept.
 [[nodiscard]] inline std::string keep_incomplete(ipc::LogWriter* log) {
   const std::string kept = log->keep_incomplete();

@@ -20,7 +20,7 @@ class Path {
 
   Path() = default;
   // Straight lines between the corners, which are rounded by arcs of at most `radius_m` (less where the lines
-  // are too short), then smoothed a little, as nobody steers in steps. Precondition: two corners or more,
+  // are too short), then smoothed a little, since steering is continuous. Precondition: two corners or more,
   // three for a closed path, each more than a metre from the next.
   Path(const std::vector<Eigen::Vector2d>& corners, double radius_m, bool closed);
 
