@@ -1,4 +1,4 @@
-// Centre lines of roads in the plane, and how far places are from them.
+// Centre lines of roads in the plane, and distances from them.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +27,7 @@ class Path {
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] bool closed() const { return closed_; }
   [[nodiscard]] bool empty() const { return points_.empty(); }
-  // Beyond its ends an open path goes straight on; a closed one goes round again.
+  // An open path continues straight beyond its ends; a closed one repeats.
   [[nodiscard]] Place at(double s_m) const;
 
  private:
@@ -40,12 +40,12 @@ class Path {
   bool closed_ = false;
 };
 
-// Finds the nearest of many points of roads. Not thread-safe: it remembers.
+// Finds the nearest of many points of roads. Not thread-safe: it caches distances.
 class RoadFinder {
  public:
   static constexpr double kMaxDistance_m = 3000.0;
   void add(const Path& path, double half_width_m);
-  // Metres from the nearest road's edge, negative on it; kMaxDistance_m where there is none nearer.
+  // Metres from the nearest road's edge, negative on it; kMaxDistance_m beyond that distance.
   [[nodiscard]] double distance_m(double x, double y) const;
 
  private:
