@@ -46,7 +46,7 @@ class Plot {
   // A vertical line across the whole diagram.
   void mark_x(const std::string& name, double x, const Style& style);
 
-  // Empty where nothing was drawn.
+  // Empty if nothing was drawn.
   [[nodiscard]] std::string svg() const;
 
  private:
