@@ -99,7 +99,7 @@ struct RawLimits {
   double least = 0.0, most = 0.0;
   [[nodiscard]] bool hold(double number) const { return number >= least && number <= most; }
 };
-// The numbers that so many bits hold. Of more than 53 a double cannot tell the last ones apart.
+// The range of `length` bits. Above 53 bits a double does not represent every integer.
 RawLimits raw_limits(const DbcSignal& d) {
   constexpr unsigned kExactBits = 53;
   const unsigned bits = d.is_signed ? d.length - 1 : d.length;

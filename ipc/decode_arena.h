@@ -1,4 +1,5 @@
-// Memory for the image libraries, which allocate and free anew for every image: taken from blocks that stay.
+// Memory for the image libraries, which allocate and free for every image. Blocks are kept from image to
+// image.
 #pragma once
 
 #include <cstddef>
@@ -8,18 +9,18 @@
 
 namespace farpoint::ipc {
 
-// Hands out pieces one after the other and takes them back all at once. After the largest image has passed
-// once it makes no heap call.
+// A bump allocator: allocates in sequence, frees all at once. It makes no heap call after the first image of
+// the largest size. Not thread-safe.
 class DecodeArena {
  public:
-  // For SIMD rows of libjpeg-turbo, which asks for 32.
+  // libjpeg-turbo's SIMD rows require 32.
   static constexpr std::size_t kAlignment = 64;
 
   // Allocates and touches the first block: enough for the images of most cameras.
   DecodeArena();
-  // Null where there is no memory.
+  // Returns null without memory.
   [[nodiscard]] void* allocate(std::size_t bytes) noexcept;
-  // Everything handed out is free again.
+  // Frees all allocations.
   void reset() noexcept {
     block_ = 0;
     used_ = 0;
@@ -35,7 +36,7 @@ class DecodeArena {
   bool add_block(std::size_t bytes) noexcept;
 
   std::vector<Block> blocks_;
-  std::size_t block_ = 0, used_ = 0;  // the present block, and what is gone of it
+  std::size_t block_ = 0, used_ = 0;  // the current block, and its used bytes
 };
 
 }  // namespace farpoint::ipc

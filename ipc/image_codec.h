@@ -1,4 +1,4 @@
-// Image bytes to 8-bit grey. Nothing in here throws (but for memory) or crashes on damaged bytes.
+// Decodes image bytes to 8-bit grey. Damaged bytes neither throw nor crash; only lack of memory throws.
 #pragma once
 
 #include <cstdint>
@@ -22,24 +22,24 @@ struct GreyImage {
 
 enum class ImageStatus : std::uint8_t {
   kOk,
-  kWrongSize,      // the bytes hold an image of another size than the message says, or too few bytes of grey
-  kUnknownFormat,  // a pixel format that is not image_t's
+  kWrongSize,      // the size differs from the message's, or grey bytes are missing
+  kUnknownFormat,  // a pixel format outside image_t's
   kDamaged,        // the JPEG or PNG cannot be decoded in full
 };
 [[nodiscard]] const char* to_string(ImageStatus status);
 
-// What an image file's head says.
+// Format and size from an image file's header.
 struct ImageInfo {
   std::int32_t pixel_format = 0;  // image_t::PIXEL_FORMAT_MJPEG or PIXEL_FORMAT_PNG
   int width_px = 0, height_px = 0;
 };
-// Reads the head of a JPEG or PNG file. Empty where it is neither or is cut off before its size.
+// Reads the header of a JPEG or PNG file. Empty for other files and ones cut off before the size.
 [[nodiscard]] std::optional<ImageInfo> probe_image(std::span<const std::uint8_t> file);
 
 inline constexpr int kMaxImageSide_px = 16384;
 
-// Keeps the decoders' working memory from image to image: no heap call after the first images (a progressive
-// JPEG excepted, which is decoded as a whole). Not thread-safe: one a thread.
+// Keeps the decoders' working memory from image to image: no heap call after the first images, except for
+// progressive JPEGs, which are decoded as a whole. Not thread-safe: one instance a thread.
 class ImageDecoder {
  public:
   ImageDecoder();
@@ -47,10 +47,10 @@ class ImageDecoder {
   ImageDecoder(const ImageDecoder&) = delete;
   ImageDecoder& operator=(const ImageDecoder&) = delete;
 
-  // Decodes message.data (its first message.size bytes). Colour becomes luma, 16 bit becomes 8. On any status
-  // but kOk the image's content is unspecified.
+  // Decodes the first message.size bytes of message.data. Colour becomes luma, 16 bit becomes 8. On any
+  // status except kOk the image's content is unspecified.
   [[nodiscard]] ImageStatus decode(const image_t& message, GreyImage* image);
-  // One JPEG file of this size, wherever it lies: a camera's buffer.
+  // Decodes one JPEG file of this size from any memory, such as a camera's buffer.
   [[nodiscard]] ImageStatus decode_jpeg(std::span<const std::uint8_t> file, int width_px, int height_px,
                                         GreyImage* image);
 

@@ -51,7 +51,7 @@ struct LogReader::Header {
 
 LogReader::LogReader(const std::string& path)
     : fd_(path != "-" ? open_log(path) : STDIN_FILENO), owns_fd_(path != "-"), buffer_(2 * kReadBytes) {
-  // A pipe holds 64 kB, less than an image: whoever writes and we would take turns. Where it is none, or the
+  // A pipe holds 64 kB, less than an image: writer and reader would alternate. Where it is none, or the
   // system allows no more, it stays as it is.
   constexpr int kPipeBytes = 1 << 20;
   if (!owns_fd_) (void)fcntl(fd_, F_SETPIPE_SZ, kPipeBytes);

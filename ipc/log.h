@@ -1,9 +1,9 @@
-// LCM logs: reading that survives damage, writing that leaves a whole file or none.
+// Reads LCM logs through damage, and writes them whole or not at all.
 //
 // Event format (LCM's, big-endian): sync word 0xEDA1DA01, event number (8 bytes), receive time in us (8),
-// length of the channel name (4), length of the data (4), name, data. LCM's own reader asserts on damaged
-// lengths and cannot read a pipe, so the reader here is our own; a test shows that both agree on an intact
-// log. Writing uses LCM's.
+// length of the channel name (4), length of the data (4), name, data. The reader is Farpoint's, since LCM's
+// asserts on damaged lengths and cannot read a pipe; a test shows that both agree on an intact log. Writing
+// uses LCM's.
 #pragma once
 
 #include <lcm/eventlog.h>
@@ -21,45 +21,45 @@ namespace farpoint::ipc {
 
 // One event. Views are valid until the reader's next call.
 struct LogEvent {
-  std::int64_t number = 0;        // as written; not necessarily consecutive after damage
-  std::int64_t timestamp_us = 0;  // when it was received; a frame's time is its message's utime instead
+  std::int64_t number = 0;        // as written; may skip after damage
+  std::int64_t timestamp_us = 0;  // time of reception; a frame's time is its message's utime
   std::uint64_t offset = 0;       // of the sync word in the file, bytes
   std::string_view channel;
   std::span<const std::uint8_t> data;
 };
 
-// What could not be read.
+// The part of a log that could not be read.
 struct LogDamage {
-  std::uint64_t places = 0;        // connected stretches that were skipped, a cut-off end included
-  std::uint64_t bytes = 0;         // skipped in all
+  std::uint64_t places = 0;        // skipped stretches, a cut-off end included
+  std::uint64_t bytes = 0;         // skipped in total
   std::uint64_t first_offset = 0;  // of the first place
-  bool cut_off = false;            // known at the end: the last place reaches it
-  std::string read_error;          // errno's text where the disk or pipe itself failed, else empty
+  bool cut_off = false;            // the last place reaches the end; valid at the end only
+  std::string read_error;          // errno's text after a failure of disk or pipe, else empty
 };
 
 class LogReader {
  public:
-  // "-" is standard input. Throws std::runtime_error naming the file where it cannot be opened.
+  // "-" is standard input. Throws std::runtime_error naming a file that cannot be opened.
   explicit LogReader(const std::string& path);
   ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
 
-  // The next event that can be read; false at the end. Damaged stretches are skipped and counted in damage().
+  // Returns the next readable event; false at the end. Damaged stretches are skipped and counted in damage().
   [[nodiscard]] bool next(LogEvent* event);
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
-  [[nodiscard]] std::uint64_t events() const { return events_; }  // given out so far
+  [[nodiscard]] std::uint64_t events() const { return events_; }  // returned so far
 
   static constexpr std::uint32_t kSyncWord = 0xEDA1DA01;
   static constexpr std::size_t kHeaderBytes = 28;
   static constexpr std::size_t kMaxChannelBytes = 255;
-  // Longer is taken for a damaged length: far beyond any image here.
+  // A greater length counts as damage; far above any image.
   static constexpr std::size_t kMaxDataBytes = std::size_t{64} << 20;
 
  private:
   struct Header;
-  // Makes `bytes` bytes available from the present position, where the file has them.
+  // Loads `bytes` bytes from the current position, if the file has them.
   bool available(std::size_t bytes);
   [[nodiscard]] const std::uint8_t* here() const { return buffer_.data() + begin_; }
   bool read_header(std::size_t ahead, Header* header);
@@ -70,42 +70,42 @@ class LogReader {
 
   int fd_ = -1;
   bool owns_fd_ = false;
-  bool at_end_ = false;  // nothing more to read from fd_
+  bool at_end_ = false;  // fd_ is at its end
   std::vector<std::uint8_t> buffer_;
   std::size_t begin_ = 0, end_ = 0;  // unread bytes within buffer_
-  std::size_t consumed_ = 0;         // of the event given out last
+  std::size_t consumed_ = 0;         // of the event returned last
   std::uint64_t offset_ = 0;         // of begin_ in the file
-  std::uint64_t damage_end_ = 0;     // where the last damaged stretch ended
+  std::uint64_t damage_end_ = 0;     // end of the last damaged stretch
   std::uint64_t events_ = 0;
   LogDamage damage_;
 };
 
 class LogWriter {
  public:
-  // "-" is standard output. Throws std::runtime_error naming the file where it cannot be written.
+  // "-" is standard output. Throws std::runtime_error naming a file that cannot be written.
   explicit LogWriter(const std::string& path);
-  // Without close(): nothing is left behind.
+  // Without close() no file remains.
   ~LogWriter();
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
 
-  // Appends one event. False where it was not stored; error() says why, and close() will throw.
+  // Appends one event. Returns false if it was not stored; error() holds the reason, and close() throws.
   bool write(std::string_view channel, std::int64_t timestamp_us, std::span<const std::uint8_t> data);
-  // The same for an LCM message. Precondition: its vectors are as long as its counts say.
+  // Appends an LCM message. Precondition: its vectors have the lengths of its counts.
   template <typename Message>
   bool write_message(std::string_view channel, std::int64_t timestamp_us, const Message& message) {
     encode(message, &scratch_);
     return write(channel, timestamp_us, scratch_);
   }
 
-  // Flushes, and puts the file in its place. Throws std::runtime_error where anything was not stored (disk
-  // full): the target is then as it was before.
+  // Flushes and renames the file to its target. Throws std::runtime_error if anything was not stored (disk
+  // full); the target is then unchanged.
   void close();
 
-  // Hands what was written so far to the system, so that a killed program leaves it. False as for write().
+  // Flushes to the system, so that the data survives a kill of the program. Returns false as write() does.
   bool flush();
-  // Ends a log that could not be completed, and keeps it beside the target as <target>.incomplete; the target
-  // stays as it was. Empty where there is nothing to keep (a device or a pipe), else the kept file's path.
+  // Ends an incomplete log and keeps it as <target>.incomplete; the target stays unchanged. Returns the kept
+  // file's path, empty for a device or a pipe.
   std::string keep_incomplete();
 
   [[nodiscard]] const std::string& error() const { return error_; }

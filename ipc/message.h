@@ -1,9 +1,8 @@
-// LCM messages from and to bytes.
+// Decodes and encodes LCM messages.
 //
 // lcm-gen's decoders trust counts and string lengths: a damaged one makes them allocate gigabytes or read
-// beyond the buffer. decode() therefore walks the bytes first, along the type's layout, and lets the
-// generated code only see messages whose every length fits. A test derives the layouts anew from
-// ipc/types/*.lcm.
+// beyond the buffer. decode() therefore checks every length along the type's layout before it calls the
+// generated code. A test derives the layouts from ipc/types/*.lcm.
 #pragma once
 
 #include <cstdint>
@@ -33,12 +32,12 @@
 namespace farpoint::ipc {
 
 // A layout is a sequence of items:
-//   <digits>        so many bytes of numbers
+//   <digits>        this number of bytes of numbers
 //   s               a string: int32 length with the final NUL, then its bytes
 //   #               an int32 that counts a later array; they are numbered from 0 within their struct
-//   [n:items]       an array of as many `items` as count number n says
+//   [n:items]       an array of `items`, its length in count number n
 template <typename Message>
-inline constexpr std::string_view kLayout = {};  // empty: not a type that decode() takes
+inline constexpr std::string_view kLayout = {};  // empty: no type of decode()
 template <>
 inline constexpr std::string_view kLayout<calibration_t> = "8s#[0:ss8 32 40 56 16]1 24 32 40";
 template <>
@@ -74,11 +73,11 @@ inline constexpr std::string_view kLayout<trajectory_t> = "8 8 1 8 #[0: 12 24 32
 template <>
 inline constexpr std::string_view kLayout<wheels_t> = "8 32 #[0:8]";
 
-// True where the bytes are exactly as long as the layout says, every count and length included.
+// Returns true if the bytes have exactly the layout's length, every count and string included.
 [[nodiscard]] bool fits_layout(std::span<const std::uint8_t> bytes, std::string_view layout);
 
-// True where `data` (with the leading fingerprint) is one whole message of this type. On false the message's
-// content is unspecified. Arrays of a reused message may be longer than their count: use the count.
+// Returns true if `data` (with the leading fingerprint) is one whole message of this type. On false the
+// message's content is unspecified. Arrays of a reused message may be longer than their count; use the count.
 template <typename Message>
 [[nodiscard]] bool decode(std::span<const std::uint8_t> data, Message* message) {
   static_assert(!kLayout<Message>.empty(), "give this type a layout");
@@ -92,7 +91,7 @@ template <typename Message>
   }
 }
 
-// Encodes into `bytes`, replacing its content. Precondition: vectors are as long as their counts say.
+// Encodes into `bytes` and replaces its content. Precondition: vectors have the lengths of their counts.
 template <typename Message>
 void encode(const Message& message, std::vector<std::uint8_t>* bytes) {
   const int size = message.getEncodedSize();

@@ -87,7 +87,7 @@ void OutputFile::close() {
 std::string flush_to_disk(std::FILE* stream) {
   if (std::fflush(stream) != 0) return std::strerror(errno);
   if (std::ferror(stream) != 0) return "an earlier write failed (disk full?)";
-  // Pipes and devices cannot be synchronised: EINVAL and EROFS say so.
+  // EINVAL and EROFS: a pipe or device, which cannot be synchronised.
   if (fsync(fileno(stream)) != 0 && errno != EINVAL && errno != EROFS) return std::strerror(errno);
   return {};
 }

@@ -1,4 +1,4 @@
-// Geometry as the messages carry it; the other way round is rig.h.
+// Geometry to calibration messages. rig.h converts the other way.
 #pragma once
 
 #include <string>

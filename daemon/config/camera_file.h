@@ -13,20 +13,20 @@ namespace farpoint::daemon {
 
 struct CameraFile {
   slam::Camera::Parameters parameters;
-  std::optional<slam::SE3> T_body_camera;  // nothing: the file names no body
+  std::optional<slam::SE3> T_body_camera;  // empty: the file names no body
   double rate_hz = 0.0;                    // nominal; 0 unknown
   double row_time_s = -1.0;                // rolling shutter: one row to the next; 0 global; negative unknown
 };
 
-// Throws InputError naming file, line, key and what was expected.
+// Throws InputError with file, line, key and what was expected.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
-// The same for a file's content that is at hand; `file` is for complaints.
+// Reads a file's content; `file` names it in errors.
 [[nodiscard]] CameraFile parse_camera_file(const std::string& content, const std::filesystem::path& file);
 
-// The calibration of a vehicle with this one camera, as a log carries it.
+// Returns the calibration message of a vehicle with this one camera.
 [[nodiscard]] calibration_t calibration_of(const CameraFile& camera, const std::string& name);
-// The same with two, CAMERA_0 and CAMERA_1, read from their files. Throws InputError also where one of them
-// has no T_body_camera: which body they share, and how they stand to each other, cannot be guessed.
+// The same with two, CAMERA_0 and CAMERA_1, read from their files. Also throws InputError for a file without
+// T_body_camera, since the relative pose would be unknown.
 [[nodiscard]] calibration_t read_stereo_calibration(const std::filesystem::path& first,
                                                     const std::filesystem::path& second);
 

@@ -1,8 +1,8 @@
 // The daemon's configuration: farpoint.yaml and --set, checked key by key.
 //
-// One table (config_keys()) knows every key: name, type, unit, range, and the field it fills. Parsing,
-// checking, the canonical text, its hash and the test that config/farpoint.yaml tells the truth are all
-// driven by it, so a new key is one line in config_keys.cc and one entry in config/farpoint.yaml.
+// One table (config_keys()) holds every key: name, type, unit, range, and the field it fills. Parsing,
+// checks, canonical text and hash use it, and a test compares config/farpoint.yaml with it. A new key is one
+// line in config_keys.cc and one entry in config/farpoint.yaml.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,7 @@ struct ExposureConfig {
 };
 
 struct CameraConfig {
-  int index = 0;  // which camera of the log, and of its calibration, is tracked
+  int index = 0;  // the tracked camera, in the log and its calibration
   // Live.
   CameraDriverChoice driver = CameraDriverChoice::kV4l2;
   std::string device = "/dev/video0";
@@ -57,8 +57,8 @@ struct CameraConfig {
   int buffers = 4;
   StampPointChoice stamp = StampPointChoice::kAuto;
   int time_offset_us = 0;
-  double stall_s = 1.0;        // silent for so long: started anew
-  double lost_after_s = 0.25;  // silent for so long: 'no_camera'
+  double stall_s = 1.0;        // silence after which the stream restarts
+  double lost_after_s = 0.25;  // silence after which the state is 'no_camera'
   ExposureConfig exposure;
 
   [[nodiscard]] bool has_second() const { return second_device != "none"; }
@@ -98,13 +98,13 @@ struct ThreadConfig {
 struct RealtimeConfig {
   bool lock_memory = true;
   int stack_kb = 512;           // of each thread
-  int capture_queue = 2;        // images that may wait for tracking
+  int capture_queue = 2;        // images that wait for tracking at most
   double least_features = 0.5;  // share of extractor.features, while tracking does not keep pace
   SchedulingPolicy policy = SchedulingPolicy::kFifo;
   ThreadConfig capture, tracking, output, mapping;
   double deadline_ms = 0;   // mid-exposure to output; 0: live a frame period, in replay none
-  int cpu_latency_us = -1;  // live; -1: as the system likes
-  bool require = false;     // leave where the system refuses
+  int cpu_latency_us = -1;  // live; -1: unchanged
+  bool require = false;     // exit if the system refuses one of these
 };
 
 struct Config {
@@ -118,7 +118,7 @@ struct Config {
   slam::EstimatorConfig estimator;
 };
 
-// What a user did wrong: what() is one line with place, key, value and what was expected.
+// A user's error: what() is one line with place, key, value and what was expected.
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -135,7 +135,7 @@ struct ConfigKey {
   std::vector<std::string> choices;
   // Canonical text of the value: a number's shortest form that reads back to the same bits.
   std::function<std::string(const Config&)> get;
-  // Stores a value that was checked; numbers come as text that parses.
+  // Stores a checked value; text of numbers parses.
   std::function<void(Config&, const std::string&)> set;
 };
 
@@ -146,19 +146,19 @@ struct ConfigKey {
 // "[px; 1 to 100; default 15]": the line that config/farpoint.yaml carries above the key.
 [[nodiscard]] std::string documentation_line(const ConfigKey& key);
 
-// Where each key was last set ("FILE:LINE" or "--set"); a key that is missing has its built-in default.
+// The place where each key was last set ("FILE:LINE" or "--set"); a missing key has its built-in default.
 using ConfigOrigins = std::map<std::string, std::string>;
 
-// Reads a YAML file, or text that stands for it, over *config. Throws ConfigError.
+// Reads a YAML file, or its text, over *config. Throws ConfigError.
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins);
 void load_config_text(const std::string& text, const std::string& file_name, Config* config,
                       ConfigOrigins* origins);
 // Applies one "dotted.key=value" of the command line. Throws ConfigError.
 void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins);
-// Checks what concerns more than one key. Throws ConfigError.
+// Checks conditions between keys. Throws ConfigError.
 void check_relations(const Config& config, const ConfigOrigins& origins);
 
-// Canonical text of one key's value. Throws std::out_of_range for a name that is not in the table.
+// Canonical text of one key's value. Throws std::out_of_range for an unknown name.
 [[nodiscard]] std::string value_text(const Config& config, const std::string& name);
 // Every key as YAML, in table order and in one spelling: equal texts mean equal configurations, and
 // load_config_text() reads it back.

@@ -35,7 +35,7 @@ constexpr const char* kFooter =
     "lcm-spy)\n"
     "  farpoint evaluate out.lcm --truth run.lcm\n"
     "\n"
-    "Exit status: 0 done (a run that was lost or never initialised is done; its last line says so);\n"
+    "Exit status: 0 done (a run that was lost or never initialised is done; its last line states it);\n"
     "1 failed while running; 2 wrong use, configuration or input.";
 
 struct Parsed {

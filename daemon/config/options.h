@@ -1,4 +1,4 @@
-// The command line of farpointd, as DESIGN.md promises it.
+// The command line of farpointd.
 #pragma once
 
 #include <optional>
@@ -8,17 +8,17 @@
 
 namespace farpoint::daemon {
 
-// What the daemon was asked to do. Empty paths mean "not wanted".
+// Options of one run. An empty path turns its output off.
 struct Options {
   std::optional<std::string> config_path;
   std::string replay;  // "-" is standard input; empty: live
-  // Threads, at so many times the recorded pace; else one thread.
+  // Threads at N times the recorded pace; empty: one thread.
   std::optional<double> speed;
-  // Repeat a threaded run: its schedule is in this log. Empty: no.
+  // Log with the schedule of the threaded run to repeat. Empty: none.
   std::string schedule_log;
   std::string output, trajectory, live_trajectory, can_log;
-  std::string record;  // live: what the camera gave
-  // Engaged but empty: wanted, with lcm.url or can.interface of the configuration.
+  std::string record;  // live: log of the camera's images
+  // Present and empty: lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;
   std::vector<std::string> settings;  // "dotted.key=value", in order
 };
@@ -29,8 +29,7 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Outcome of reading the command line: either options, or text to print (--help, --version) and leave with
-// status 0.
+// Result of parsing: options, or text to print (--help, --version) before leaving with status 0.
 struct CommandLine {
   Options options;
   std::string text_and_leave;

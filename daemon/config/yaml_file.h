@@ -1,4 +1,4 @@
-// YAML files read strictly: every complaint names file and line.
+// Strict YAML files: every error names file and line.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -14,9 +14,9 @@ namespace farpoint::daemon {
 
 class YamlFile {
  public:
-  // Throws InputError where the file cannot be read, is no YAML, or its top is no map.
+  // Throws InputError if the file cannot be read, is no YAML, or its top is no map.
   explicit YamlFile(std::filesystem::path file);
-  // The same for content that is at hand; `file` is for complaints.
+  // Reads a file's content; `file` names it in errors.
   YamlFile(std::filesystem::path file, const std::string& content);
 
   [[nodiscard]] const YAML::Node& root() const { return root_; }
@@ -32,7 +32,7 @@ class YamlFile {
   // A list of finite numbers, of one of the given lengths.
   [[nodiscard]] std::vector<double> numbers(const std::string& key,
                                             const std::vector<std::size_t>& lengths) const;
-  // 16 numbers by rows into a rigid motion; `name` is for the error.
+  // Reads 16 numbers by rows into a rigid motion; `name` is for the error.
   [[nodiscard]] slam::SE3 rigid_motion(const YAML::Node& list, const std::string& name) const;
   // Fails for a key that is none of these.
   void allow_only(const std::vector<std::string>& keys) const;
@@ -46,7 +46,8 @@ class YamlFile {
   YAML::Node root_;
 };
 
-// Nearest rigid motion of a 3x3 or 3x4 matrix by rows where it is one to `tolerance`; false elsewhere.
+// Returns the nearest rigid motion of a 3x3 or 3x4 matrix by rows; false if it differs by more than
+// `tolerance`.
 [[nodiscard]] bool to_rigid_motion(const Eigen::Matrix<double, 3, 4>& matrix, slam::SE3* motion);
 
 }  // namespace farpoint::daemon

@@ -1,4 +1,4 @@
-// One live camera's counts as those of all that came in.
+// Converts one live camera's counts to InputCounts.
 #pragma once
 
 #include "daemon/input/counts.h"

@@ -1,4 +1,4 @@
-// From the configuration to a camera.
+// Creates a camera from the configuration.
 #pragma once
 
 #include <memory>
@@ -9,10 +9,9 @@
 
 namespace farpoint::daemon {
 
-// Opens nothing: a camera that is not there yet is waited for. Throws ConfigError where this build or machine
-// has not got the driver, or the device is not named as the driver wants it. Before threads are started and
-// memory is locked: a driver may be loaded. `key`: what names the device in the configuration, for
-// complaints.
+// Does not open the device; an absent camera is searched later. Throws ConfigError for a driver that this
+// build or machine lacks, and for an invalid device name. Call before threads start and memory is locked,
+// since a driver may be loaded. `key`: the device's key, for errors.
 [[nodiscard]] std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver,
                                                            const drivers::CameraOptions& options,
                                                            const std::string& key);

@@ -1,4 +1,4 @@
-// What happens to a live camera, from its capture thread to the one that says it.
+// Passes a live camera's events from its capture thread to the thread that logs them.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@ namespace farpoint::daemon {
 
 class CameraEvents {
  public:
-  // Before the first image; this outlives the camera.
+  // Call before the first image. This object outlives the camera.
   void listen_to(drivers::Camera* camera) {
     camera->on_event([this](const drivers::CameraEvent& event) { (void)events_.push(event); });
   }
 
-  // Any one other thread: what has happened since, oldest first; false where nothing has.
+  // One other thread: takes the oldest new event; false without one.
   [[nodiscard]] bool take(drivers::CameraEvent* event) {
     const drivers::CameraEvent* oldest = events_.front();
     if (oldest == nullptr) return false;
@@ -25,7 +25,7 @@ class CameraEvents {
   }
 
  private:
-  static constexpr std::size_t kEvents = 64;  // older ones are what an operator wants: newer give way
+  static constexpr std::size_t kEvents = 64;  // a full ring drops new events and keeps old ones
   slam::SpscRing<drivers::CameraEvent> events_{kEvents};
 };
 

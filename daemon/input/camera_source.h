@@ -1,5 +1,4 @@
-// A live camera as the capture thread's source, with a recorder beside it where one is wanted, and a second
-// camera where there is one.
+// A live camera as the capture thread's source, with an optional recorder and second camera.
 #pragma once
 
 #include <memory>
@@ -16,14 +15,14 @@ namespace farpoint::daemon {
 class CameraSource final : public CaptureSource {
  public:
   explicit CameraSource(std::unique_ptr<drivers::Camera> camera);
-  // Before the first image; the recorder outlives this.
+  // Call before the first image. The recorder outlives this object.
   void record_to(Recorder* recorder) { recorder_ = recorder; }
-  // Before the first image; the other camera outlives this. Images go on at once, with it or without.
+  // Call before the first image. The other camera outlives this object. Images never wait for it.
   void pair_with(SecondCamera* second, std::int64_t tolerance_us) { stereo_.emplace(second, tolerance_us); }
 
   [[nodiscard]] CaptureStatus next(const std::atomic<bool>& stop, CapturedImage* image) override;
 
-  // Any one other thread: what has happened since, oldest first; false where nothing has.
+  // One other thread: takes the oldest new event; false without one.
   [[nodiscard]] bool take_event(drivers::CameraEvent* event) { return events_.take(event); }
   void set_exposure(const drivers::ExposureOptions& options) { camera_->set_exposure(options); }
 

@@ -1,4 +1,4 @@
-// What came in, what was refused, and what could not be sent, since the start.
+// Counts since the start: received, refused, not sent.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,13 @@ struct InputCounts {
   std::int64_t images = 0;  // of all cameras
   std::int64_t wrong_size = 0, undecodable = 0, unknown_camera = 0, times_backwards = 0;
   std::int64_t messages_undecodable = 0, log_damages = 0;
-  // Live cameras: gaps in the driver's numbers, buffers it called damaged, times it went away or fell silent.
+  // Live cameras: gaps in the driver's numbers, buffers marked as damaged, losses and stalls.
   std::int64_t missing = 0, flagged = 0, camera_losses = 0;
-  // Live with a second camera: images of the two matched by time, and those of either without a partner.
+  // Live with a second camera: pairs by time, and images without a partner.
   std::int64_t stereo_pairs = 0, stereo_left_alone = 0, stereo_right_alone = 0;
 };
 
-// What could not be sent; the bus is counted here because its sink is no message sink.
+// Messages and frames not sent. The bus is counted here because its sink is no message sink.
 struct OutputCounts {
   std::int64_t can_send_errors = 0, can_bus_offs = 0, can_received = 0;
   std::int8_t can_state = 0;  // drivers::CanState

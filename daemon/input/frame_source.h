@@ -1,4 +1,4 @@
-// Where images come from: one interface, whether it is a recording or, later, a camera.
+// Source of images: one interface for all recordings.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace farpoint::daemon {
 
-// One decoded image; the source's until its next call.
+// One decoded image, valid until the source's next call.
 struct SourceFrame {
   std::int64_t utime = 0;  // mid-exposure, microseconds
   std::int64_t sequence = 0;
@@ -27,16 +27,16 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  // The next image of the tracked camera that can be used; false at the end. Refused ones are counted.
-  // `clock` gets the time of decoding. Throws InputError where what is needed is not there,
-  // std::runtime_error where reading fails.
+  // Returns the next accepted image of the tracked camera; false at the end. Refused ones are counted.
+  // `clock` gets the time of decoding. Throws InputError for missing input, std::runtime_error for a failed
+  // read.
   [[nodiscard]] virtual bool next(SourceFrame* frame, StageClock* clock) = 0;
-  // Gives the image that next() gave last in exchange for another, without copying it.
+  // Swaps the last image of next() with another, without a copy.
   virtual void swap_image(ipc::GreyImage* image) = 0;
-  // Known once next() has given the first image.
+  // Valid after the first image of next().
   [[nodiscard]] virtual const calibration_t& calibration() const = 0;
   [[nodiscard]] virtual InputCounts counts() const = 0;
-  // How much of the source has been given out, 0..1; negative where its length is not known.
+  // Consumed share of the source, 0..1; negative for an unknown length.
   [[nodiscard]] virtual double progress() const = 0;
 };
 

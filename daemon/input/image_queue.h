@@ -1,4 +1,4 @@
-// Images on their way from capture to tracking: the newest few, in memory allocated at start.
+// Queue of images from capture to tracking: the newest N, in memory allocated at start.
 #pragma once
 
 #include <atomic>
@@ -12,38 +12,38 @@
 
 namespace farpoint::daemon {
 
-// One decoded image and what is known of it.
+// One decoded image and its data.
 struct CapturedImage {
   ipc::GreyImage image;
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
   std::int32_t exposure_us = -1;    // -1 unknown
   float gain = -1.0F;               // -1 unknown
-  InputCounts in;                   // when it was read
-  std::int64_t frames_dropped = 0;  // when it was queued
+  InputCounts in;                   // at the time of reading
+  std::int64_t frames_dropped = 0;  // at the time of queueing
   double due_s = 0;                 // steady clock
   double decode_cpu_ms = -1.0, decode_wall_ms = -1.0;
   double progress = -1.0;  // of the source, as FrameSource::progress()
 };
 
-// A ring between two threads in which the newest wins: where it is full, the oldest waiting image gives way
-// and is counted. Neither side waits.
+// A ring between two threads in which the newest images win: a full ring drops and counts the oldest waiting
+// image. Neither side waits.
 class ImageQueue {
  public:
-  // So many images may wait.
+  // `capacity`: images that wait at most.
   ImageQueue(std::size_t capacity, int width_px, int height_px);
 
-  // Capture. The image to fill; it is nobody else's until push().
+  // Capture: returns the image to fill, owned by the caller until push().
   [[nodiscard]] CapturedImage* begin_push();
   void push();
-  // No more will come.
+  // Capture: no image follows.
   void close() { closed_.store(true, std::memory_order_release); }
 
-  // Tracking. The oldest image that waits, null where none does; it is the caller's until give_back().
+  // Tracking: returns the oldest waiting image, null without one; owned by the caller until give_back().
   [[nodiscard]] CapturedImage* pop();
   void give_back(CapturedImage* image);
 
-  // Anyone.
+  // Any thread.
   [[nodiscard]] bool is_closed() const { return closed_.load(std::memory_order_acquire); }
   [[nodiscard]] std::size_t waiting() const;
   [[nodiscard]] std::int64_t pushed() const {
@@ -58,10 +58,10 @@ class ImageQueue {
     CapturedImage image;
     std::atomic<bool> used{false};
   };
-  // Takes the oldest entry; both threads may. kNone where there is none.
+  // Takes the oldest entry; both threads may call it. kNone without one.
   std::uint32_t take_oldest();
 
-  std::vector<Slot> slots_;  // those that wait, the one being filled, the one being tracked
+  std::vector<Slot> slots_;  // waiting images, the one being filled, the one being tracked
   std::vector<std::atomic<std::uint32_t>> ring_;
   std::atomic<std::uint64_t> head_{0};  // images pushed; capture's
   std::atomic<std::uint64_t> tail_{0};  // images popped or dropped

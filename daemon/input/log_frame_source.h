@@ -12,11 +12,11 @@ namespace farpoint::daemon {
 
 class LogFrameSource final : public FrameSource {
  public:
-  // "-" is standard input. Throws InputError where the log cannot be opened.
+  // "-" is standard input. Throws InputError if the log cannot be opened.
   LogFrameSource(const std::string& path, int camera_index);
 
-  // Throws InputError at the end of a log that gave no image at all: no calibration, no such camera, nothing
-  // that could be decoded; the line says which.
+  // Throws InputError at the end of a log without any accepted image. The line names the cause: no
+  // calibration, no such camera, nothing decodable.
   [[nodiscard]] bool next(SourceFrame* frame, StageClock* clock) override;
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
@@ -26,9 +26,9 @@ class LogFrameSource final : public FrameSource {
   [[nodiscard]] const ipc::LogDamage& damage() const { return source_.damage(); }
   // Later calibrations that differ from the first; the first holds.
   [[nodiscard]] int calibrations_ignored() const { return calibrations_ignored_; }
-  // The image that next() gave last.
+  // The last image of next().
   [[nodiscard]] const ipc::GreyImage& image() const { return image_; }
-  // What to call the log in a message.
+  // Name of the log in messages.
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:

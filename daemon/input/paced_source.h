@@ -1,4 +1,4 @@
-// A recorded log at a multiple of its pace.
+// Plays a recorded log at a multiple of its pace.
 #pragma once
 
 #include "daemon/input/capture_source.h"
@@ -9,7 +9,7 @@ namespace farpoint::daemon {
 
 class PacedSource final : public CaptureSource {
  public:
-  // `source` has given `first`, and outlives this.
+  // `source` has returned `first`, and outlives this object.
   PacedSource(FrameSource* source, const SourceFrame& first, double speed)
       : source_(*source), frame_(first), first_utime_(first.utime), speed_(speed) {}
 

@@ -1,5 +1,5 @@
-// --record: what the cameras gave, as a log that can be replayed. Written on a thread of its own; when the
-// disk cannot follow, images are left out and counted, and nobody waits.
+// --record: writes the cameras' images to a log that can be replayed, on a thread of its own (fp-record).
+// When the disk is too slow, images are left out and counted; no thread waits.
 #pragma once
 
 #include <atomic>
@@ -21,17 +21,17 @@ class Recorder {
  public:
   static constexpr const char* kThread = "fp-record";
 
-  // For all cameras of the calibration, with which the log begins. Throws std::runtime_error where it cannot
+  // Records all cameras of the calibration, which begins the log. Throws std::runtime_error if the log cannot
   // be written.
   Recorder(const std::string& path, const calibration_t& calibration);
 
-  // The capture thread of this camera.
+  // Capture thread of this camera.
   void offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame);
-  // The recorder's thread: writes until stop() and all is written.
+  // Recorder's thread: writes until stop(), then the remaining images.
   void run();
-  // After capture has ended.
+  // Call after the end of capture.
   void stop();
-  // After run() has returned. Throws std::runtime_error where something was not stored.
+  // Call after run() has returned. Throws std::runtime_error if anything was not stored.
   void close() { log_.close(); }
 
   // Of all cameras.
@@ -44,7 +44,7 @@ class Recorder {
     drivers::CameraFrame frame;
     std::vector<std::uint8_t> pixels;
   };
-  // One camera's, as a ring has one thread that pushes.
+  // One ring a camera, since one thread pushes into a ring.
   struct Channel {
     Channel(int camera, const camera_calibration_t& calibration);
     const std::string name;
@@ -52,7 +52,7 @@ class Recorder {
     slam::SpscRing<Image> images;
   };
   void write_all();
-  // Whose oldest waiting image is the oldest of all; null where none waits.
+  // Returns the channel with the oldest waiting image; null without one.
   [[nodiscard]] Channel* oldest();
 
   ipc::LogWriter log_;

@@ -1,5 +1,5 @@
-// The second camera of a stereo pair, on a capture thread of its own. Its images go to the recorder; the
-// first camera's thread hears of each by its time alone. Neither thread waits for the other.
+// The second camera of a stereo pair, on a capture thread of its own (fp-capture-1). Its images go to the
+// recorder; the first camera's thread receives their times. Neither thread waits for the other.
 #pragma once
 
 #include <atomic>
@@ -18,34 +18,34 @@ class SecondCamera {
   static constexpr const char* kThread = "fp-capture-1";
   static constexpr int kIndex = 1;  // of the calibration's cameras; the first is 0
 
-  // An image, or that the camera has come or gone, or that there was no room to tell of one.
+  // An image, a change of the camera's presence, or the number of unreported images.
   struct News {
     bool has_image = false;
     std::int64_t utime = 0;  // of the image
     bool is_streaming = false;
     drivers::CameraCounts counts;
-    std::int64_t untold = 0;  // images so far of which nobody heard: the ring was full
+    std::int64_t untold = 0;  // images not reported so far, since the ring was full
   };
 
   explicit SecondCamera(std::unique_ptr<drivers::Camera> camera);
-  // Before the first image; the recorder outlives this.
+  // Call before the first image. The recorder outlives this object.
   void record_to(Recorder* recorder) { recorder_ = recorder; }
 
-  // Its thread: until stop(), which it hears within 0.1 s. The camera is its only waiting place.
+  // Its thread: runs until stop(), which takes effect within 0.1 s. Waits for the camera only.
   void run();
-  // One turn of run(), so that tests need no thread.
+  // One turn of run(), for tests without a thread.
   void turn();
 
   // Any thread.
   void stop() { stop_.store(true, std::memory_order_relaxed); }
   void set_exposure(const drivers::ExposureOptions& options) { camera_->set_exposure(options); }
-  // Any one other thread.
+  // One other thread.
   [[nodiscard]] bool take_event(drivers::CameraEvent* event) { return events_.take(event); }
-  // The first camera's capture thread: the news since, oldest first; false where there is none.
+  // The first camera's capture thread: takes the oldest new entry; false without one.
   [[nodiscard]] bool take_news(News* news);
 
  private:
-  // The first camera's thread looks at least every 0.1 s: enough at 600 images a second.
+  // The first camera's thread reads at least every 0.1 s: enough for 600 images a second.
   static constexpr std::size_t kNews = 64;
   void tell(const drivers::CameraFrame* frame);
 

@@ -1,5 +1,5 @@
-// Whether the two cameras of a stereo pair keep together: their images matched by time, and counted. Nothing
-// waits for the outcome, which is known up to kPatience_us after an image.
+// Matches the images of a stereo pair by time, and counts pairs and single images. No image waits for the
+// result, which follows within kPatience_us.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +13,23 @@ namespace farpoint::daemon {
 
 class StereoWatch {
  public:
-  // `second` outlives this.
+  // `second` outlives this object.
   StereoWatch(SecondCamera* second, std::int64_t tolerance_us);
 
-  // The first camera's capture thread, after each of its turns: hears of the second camera's images, and
-  // takes in its own, if one came. now_us: CLOCK_MONOTONIC, as the images' times.
+  // The first camera's capture thread calls it after each of its turns. Takes the second camera's new times
+  // and its own image, if any. now_us: CLOCK_MONOTONIC, like the images' times.
   void note(std::optional<std::int64_t> utime, std::int64_t now_us);
-  // The second camera's images and losses, and what was matched so far.
+  // The second camera's images and losses, and the pairs so far.
   void add_to(InputCounts* in) const;
 
  private:
-  // As no image waits, it is only the answer that comes later: long enough for a slow driver.
+  // Delays the count only, since no image waits; long enough for a slow driver.
   static constexpr std::int64_t kPatience_us = 200'000;
   void take_decided(std::int64_t now_us);
 
   SecondCamera& second_;
   drivers::StereoPairing pairing_;
-  std::int64_t left_refused_ = 0, right_refused_ = 0;  // came after their turn
+  std::int64_t left_refused_ = 0, right_refused_ = 0;  // arrived after their turn
   SecondCamera::News last_;
 };
 

@@ -32,7 +32,7 @@ void limit_waiting(int fd, int milliseconds) {
   setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
 }
 
-// Whoever answers there is another daemon, which keeps its socket.
+// An answer means another daemon, which keeps its socket.
 bool is_alive(const sockaddr_un& address) {
   const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   const bool alive = fd >= 0 && connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;

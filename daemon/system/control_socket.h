@@ -1,5 +1,5 @@
-// Commands to a running daemon, on a local socket: who may send them is a matter of the file's permissions,
-// since LCM's multicast knows no senders. One request a connection, one line each way.
+// Commands to a running daemon on a local socket. File permissions control access, since LCM multicast is not
+// authenticated. One request a connection, one line each way.
 #pragma once
 
 #include <functional>
@@ -9,14 +9,14 @@ namespace farpoint::daemon {
 
 class ControlSocket {
  public:
-  // Throws std::runtime_error where it cannot be made. What a daemon that was killed has left is replaced;
-  // owner and group may connect.
+  // Throws std::runtime_error if the socket cannot be created. Replaces the socket of a killed daemon. Owner
+  // and group may connect.
   explicit ControlSocket(const std::string& path);
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
 
-  // Answers who is waiting; does not wait for anyone longer than a moment.
+  // Answers waiting clients. Waits only a moment for each.
   void serve(const std::function<std::string(const std::string&)>& answer);
 
  private:
@@ -24,7 +24,7 @@ class ControlSocket {
   int fd_ = -1;
 };
 
-// The other end: sends one request and returns the answer. Throws std::runtime_error saying what is wrong.
+// Client: sends one request and returns the answer. Throws std::runtime_error with the reason.
 [[nodiscard]] std::string ask_daemon(const std::string& path, const std::string& request);
 
 }  // namespace farpoint::daemon

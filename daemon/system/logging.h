@@ -1,5 +1,5 @@
-// The daemon's log on standard error: start, end, changes of state, what did not go as configured. Never a
-// frame.
+// The daemon's log on standard error: start, end, changes of state, deviations from the configuration. No
+// line for a frame.
 #pragma once
 
 #include <string>
@@ -10,16 +10,16 @@ namespace farpoint::daemon {
 void start_logging(const std::string& level);
 void set_log_level(const std::string& level);
 
-// A bar on standard error where that is a terminal; silent elsewhere.
+// A progress bar on standard error if that is a terminal; else silent.
 class Progress {
  public:
   Progress();
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  // fraction 0..1, negative where the length is not known. Draws at most ten times a second.
+  // fraction 0..1, negative for an unknown length. Draws at most ten times a second.
   void show(double fraction, const std::string& text);
-  // Takes the bar away, so that a line can be printed.
+  // Clears the bar before other output.
   void clear();
 
  private:

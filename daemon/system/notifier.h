@@ -1,4 +1,4 @@
-// The one place where a thread may wait.
+// Wakes one thread by another without a lock: the one place where a thread waits.
 #pragma once
 
 #include <atomic>
@@ -6,8 +6,8 @@
 
 namespace farpoint::daemon {
 
-// Waiting is one system call, and none where something has happened since; telling is one, and can be left to
-// a thread that may make it.
+// wait() makes one system call, and none after a notification since seen(). notify() makes one; another
+// thread may call it in place of the one whose work is done.
 //
 //   const std::uint32_t seen = notifier.seen();
 //   if (nothing to do) notifier.wait(seen, timeout);
@@ -16,9 +16,9 @@ class Notifier {
   static constexpr std::int64_t kNoLimit = -1;
 
   [[nodiscard]] std::uint32_t seen() const { return count_.load(std::memory_order_acquire); }
-  // Returns when notify() has been called since seen(), after timeout_us, or for no reason.
+  // Returns after notify() since seen(), after timeout_us, or spuriously.
   void wait(std::uint32_t seen, std::int64_t timeout_us = kNoLimit);
-  // Wakes everyone who waits here.
+  // Wakes all waiting threads.
   void notify();
 
  private:

@@ -1,6 +1,6 @@
-// What a threaded run asks of the system: locked memory, an awake processor, threads with a name, a stack of
-// known size, a core and a priority. What is refused is said, in one place, and the run goes on without; with
-// realtime.require it does not start.
+// Real-time set-up of a threaded run: locked memory, processor latency, and for each thread name, stack size,
+// core and priority. Refusals are reported in one place and the run continues; with realtime.require it does
+// not start.
 #pragma once
 
 #include <pthread.h>
@@ -14,7 +14,7 @@
 
 namespace farpoint::daemon {
 
-// Asks for what concerns the whole process, and collects what was granted and what refused.
+// Requests what concerns the whole process, and collects grants and refusals.
 class RealtimeReport {
  public:
   explicit RealtimeReport(const RealtimeConfig& config) : config_(config) {}
@@ -22,18 +22,18 @@ class RealtimeReport {
   RealtimeReport(const RealtimeReport&) = delete;
   RealtimeReport& operator=(const RealtimeReport&) = delete;
 
-  // Locks present and future memory, where the configuration wants it. Call before the threads start.
+  // Locks present and future memory, if configured. Call before the threads start.
   void lock_memory();
-  // Keeps the processors from sleeping deeply, for as long as this object lives.
+  // Limits the processors' sleep states during the life of this object.
   void hold_cpu_latency();
-  // Whether the cores' frequency is left to fall: refused by the machine's own settings, so to speak.
-  // `root` stands before /sys; tests have their own.
+  // Reports a frequency governor that lowers the cores' frequency as a refusal. `root` is put before /sys,
+  // for tests.
   void check_governors(const std::string& root = "");
 
   void grant(const std::string& what) { granted_.push_back(what); }
   // Throws std::runtime_error with realtime.require.
   void refuse(const std::string& what);
-  // One line for all that was granted, and one for each refusal.
+  // One line for all grants, and one for each refusal.
   void print() const;
 
   [[nodiscard]] const std::vector<std::string>& granted() const { return granted_; }
@@ -48,8 +48,8 @@ class RealtimeReport {
 // A thread that runs one function to its end. The function must not throw.
 class Thread {
  public:
-  // `name`: at most 15 characters, as ps and top show it. `report` may be null. Throws std::runtime_error
-  // where no thread can be had.
+  // `name`: at most 15 characters, as ps and top show it. `report` may be null. Throws std::runtime_error if
+  // no thread can be created.
   Thread(const char* name, const RealtimeConfig& config, const ThreadConfig& wanted, RealtimeReport* report,
          std::function<void()> body);
   // Waits for its end.
@@ -58,7 +58,7 @@ class Thread {
   Thread& operator=(const Thread&) = delete;
 
   void join();
-  // CPU time that it has used so far, seconds; by any thread, while it has not been joined.
+  // CPU time used so far, seconds. Any thread, before join().
   [[nodiscard]] double cpu_s() const;
 
  private:

@@ -63,7 +63,7 @@ spdlog::sink_ptr make_file_sink(const LogConfig& config) {
   }
 }
 
-// So that the log's own thread has a stack of this size; the library does not let one say so.
+// Gives the log's own thread a stack of this size; the library has no option for it.
 class DefaultStack {
  public:
   explicit DefaultStack(std::size_t bytes) {

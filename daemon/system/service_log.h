@@ -1,5 +1,5 @@
-// The log of a service: to the journal (or standard error) and to a rotating file, written on a thread of its
-// own. Whoever logs never waits, and no flood of messages fills the disk.
+// The log of a service: to the journal (or standard error) and a rotating file, written on a thread of its
+// own (fp-log). Logging threads never wait; the message rate is limited.
 #pragma once
 
 #include <memory>
@@ -11,13 +11,13 @@
 
 namespace farpoint::daemon {
 
-// Replaces the log of start_logging(). Throws ConfigError where the file cannot be written.
+// Replaces the log of start_logging(). Throws ConfigError if the file cannot be written.
 void start_service_log(const LogConfig& config);
-// Writes what is still to be written.
+// Writes the remaining messages.
 void stop_service_log();
 
-// Hands on at most kBurst messages at once and kPerSecond a second after that; how many were left out is said
-// when there is room again. Errors always pass.
+// Passes at most kBurst messages at once and kPerSecond a second after that. Reports the number of dropped
+// ones when there is room again. Errors always pass.
 class RateLimitedSink final : public spdlog::sinks::base_sink<std::mutex> {
  public:
   static constexpr double kBurst = 100.0, kPerSecond = 10.0;

@@ -1,4 +1,5 @@
-// What the service manager is told: ready, reloading, stopping, alive. Nothing happens where there is none.
+// Reports to the service manager (systemd): ready, reloading, stopping, alive. Without one all calls do
+// nothing.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@ namespace farpoint::daemon {
 
 class ServiceManager {
  public:
-  // Reads how often it wants to hear that the service is alive.
+  // Reads the watchdog's interval.
   ServiceManager();
 
   void ready();
@@ -18,10 +19,9 @@ class ServiceManager {
   // One line for 'systemctl status'.
   void status(const std::string& text);
 
-  // Call as often as convenient, from one thread; `alive` is asked at most twenty times in the watchdog's
-  // interval, and the manager told where it says yes. A service that is not alive is not told of: it is
-  // killed and restarted, an interval after it was last said to be alive. Told at half the interval only, as
-  // is usual, it would hang for up to half an interval more.
+  // Call often, from one thread. Evaluates `alive` at most twenty times in the watchdog's interval and feeds
+  // the watchdog if it is true. The manager restarts the service one interval after the last feed. Feeding at
+  // half the interval would prolong a hang by up to half an interval.
   template <typename Alive>
   void watch(double now_s, Alive alive) {
     if (!interval_s_ || now_s < next_s_) return;

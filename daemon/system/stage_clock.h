@@ -1,6 +1,5 @@
-// Measured times of the stages of one frame, thread CPU and elapsed. The estimator has no clock: the daemon
-// measures around it. Measured values go to FARPOINT_TIMING and the last line only, nothing else may depend
-// on them.
+// Measures the stages of one frame, thread CPU and elapsed time. The estimator has no clock, so the daemon
+// measures around it. Measured values go to FARPOINT_TIMING and the last line only.
 #pragma once
 
 #include <array>
@@ -17,19 +16,19 @@ namespace farpoint::daemon {
 [[nodiscard]] double process_cpu_s();
 [[nodiscard]] double steady_s();
 
-// Bytes of this process in memory, now and at most so far; 0 where the system does not say.
+// Resident bytes of this process, now and at most so far; 0 if unknown.
 [[nodiscard]] std::int64_t resident_bytes();
 [[nodiscard]] std::int64_t peak_resident_bytes();
 
 // deadline_ms: 0 for none.
 [[nodiscard]] bool is_late(std::int64_t age_us, double deadline_ms);
 
-// Adds up what each stage of one frame took. A stage may run several times; stages may nest. Listens to an
+// Sums the times of each stage of one frame. A stage may run several times; stages may nest. Receives an
 // estimator's stages.
 class StageClock final : public slam::StageListener {
  public:
   static constexpr int kStages = timing_t::STAGES;
-  // Mapping: the camera's calibration refined from the map. Behind the stages that timing_t names.
+  // Mapping: refinement of the calibration. Follows the stages of timing_t.
   static constexpr int kCalibration = timing_t::STAGE_FRAME + 1;
   static_assert(kCalibration < kStages);
 
@@ -40,19 +39,18 @@ class StageClock final : public slam::StageListener {
   void end(int stage);
   void begin(slam::Stage stage) override;
   void end(slam::Stage stage) override;
-  // `stage` counts as not having run.
+  // Marks `stage` as not run.
   void forget(int stage);
 
-  // Negative where the stage did not run in this frame.
+  // Negative for a stage that did not run in this frame.
   [[nodiscard]] double cpu_ms(int stage) const { return cpu_ms_.at(static_cast<std::size_t>(stage)); }
   [[nodiscard]] double wall_ms(int stage) const { return wall_ms_.at(static_cast<std::size_t>(stage)); }
-  // What was measured elsewhere.
+  // Sets a time measured elsewhere.
   void set(int stage, double cpu_ms, double wall_ms) {
     cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms;
     wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms;
   }
-  // age_us: from when the frame was due to its output; 0 where there is no common clock. deadline_ms: 0 for
-  // none.
+  // age_us: from the frame's due time to its output; 0 without a common clock. deadline_ms: 0 for none.
   [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us,
                                  double deadline_ms) const;
 
@@ -60,7 +58,7 @@ class StageClock final : public slam::StageListener {
   std::array<double, kStages> cpu_ms_{}, wall_ms_{}, cpu_began_s_{}, wall_began_s_{};
 };
 
-// Measures one stage for as long as it lives.
+// Measures one stage during its life.
 class StageScope {
  public:
   StageScope(StageClock* clock, int stage) : clock_(clock), stage_(stage) { clock_->begin(stage_); }

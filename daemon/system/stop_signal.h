@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM end a run between two frames, in order: what was worked out until then is written.
+// SIGINT and SIGTERM end a run between two frames; results up to then are written.
 #pragma once
 
 #include <csignal>
@@ -12,9 +12,9 @@ class StopOnSignal {
   StopOnSignal(const StopOnSignal&) = delete;
   StopOnSignal& operator=(const StopOnSignal&) = delete;
 
-  // The signal that came, 0 for none.
+  // The received signal, 0 for none.
   [[nodiscard]] static int signal();
-  // As if SIGTERM had come.
+  // Acts like SIGTERM.
   static void ask();
 
  private:
@@ -22,7 +22,7 @@ class StopOnSignal {
   Handler on_interrupt_, on_terminate_;
 };
 
-// SIGHUP asks for the configuration to be read again.
+// SIGHUP requests that the configuration is read again.
 class ReloadOnSignal {
  public:
   ReloadOnSignal();
@@ -30,7 +30,7 @@ class ReloadOnSignal {
   ReloadOnSignal(const ReloadOnSignal&) = delete;
   ReloadOnSignal& operator=(const ReloadOnSignal&) = delete;
 
-  // True where one came since the last call.
+  // Returns true after a SIGHUP since the last call.
   [[nodiscard]] static bool take();
 
  private:

@@ -1,12 +1,12 @@
-// Exposure and gain from the brightness of the images, short exposures preferred: noise costs a tracker less
-// than motion blur.
+// Chooses exposure and gain by the brightness of the images. Prefers short exposures: noise costs a tracker
+// less than motion blur.
 #pragma once
 
 #include "drivers/camera/camera.h"
 
 namespace farpoint::drivers {
 
-// What a camera can do.
+// Limits of a camera.
 struct ExposureRange {
   double min_us = 100, max_us = 33000;
   int gain_min = 0, gain_max = 0;  // the camera's own steps; equal: it has no gain
@@ -18,19 +18,19 @@ struct ExposureSetting {
   [[nodiscard]] bool operator==(const ExposureSetting&) const = default;
 };
 
-// One number, the demand, moves through three stretches: exposure from the shortest to short_us, gain from
-// the least to its limit, exposure from short_us to max_us. Gain steps are taken as even steps of brightness,
-// which no camera promises: the loop only needs them to be brighter.
+// One number, the demand, runs through three ranges: exposure up to short_us, gain up to its limit, exposure
+// up to max_us. Gain steps count as even steps of brightness. Cameras do not guarantee this; the loop
+// requires only that more gain is brighter. Capture thread; no heap call.
 class AutoExposure {
  public:
   AutoExposure(const ExposureOptions& options, const ExposureRange& range);
 
-  // The setting to use from now on; changes only where the image is clearly off its target, and only as often
-  // as the camera can follow.
+  // Returns the setting to use from now on. It changes only where the image is clearly off its target, at
+  // most every kSettleFrames images.
   [[nodiscard]] ExposureSetting update(double mean_grey);
   [[nodiscard]] ExposureSetting setting() const;
 
-  static constexpr int kSettleFrames = 4;  // a setting shows in the images so many frames later at most
+  static constexpr int kSettleFrames = 4;  // longest delay from a setting to an image that shows it
 
  private:
   ExposureOptions options_;

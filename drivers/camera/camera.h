@@ -1,6 +1,6 @@
-// A live camera: one interface, whatever drives it. All calls but make-up, end and set_exposure() are of one
-// thread, the capture thread: next() is its only waiting place, makes no heap call after the first images and
-// writes no log; what an operator should know goes to a listener.
+// A live camera: one interface for all drivers. The capture thread makes all calls except construction,
+// destruction and set_exposure(). It waits in next() only; next() makes no heap call after the first images
+// and writes no log. A listener receives what an operator needs.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace farpoint::drivers {
 enum class CameraFormat : std::uint8_t { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
 [[nodiscard]] const char* to_string(CameraFormat format);
 
-// Who sets the exposure. kCamera: its own automatic. kAuto: AutoExposure, within limits.
+// Who sets the exposure. kCamera: the camera's automatic. kAuto: AutoExposure, within limits.
 enum class ExposureMode : std::uint8_t { kCamera, kAuto, kManual };
 
 struct ExposureOptions {
@@ -27,7 +27,7 @@ struct ExposureOptions {
   double target_grey = 110;     // mean of the image
 };
 
-// What the driver's time stamp stands for.
+// The moment of a frame that the driver's time stamp marks.
 enum class StampPoint : std::uint8_t {
   kAuto,             // as the driver says; uvcvideo: start of readout, which it calls start of exposure
   kStartOfExposure,  // of the first row
@@ -37,21 +37,21 @@ enum class StampPoint : std::uint8_t {
 
 struct CameraOptions {
   std::string device = "/dev/video0";  // see camera_path.h
-  int width_px = 0, height_px = 0;     // of the calibration: the camera must give just these
+  int width_px = 0, height_px = 0;     // of the calibration; the camera must deliver this size
   double rate_hz = 0;                  // 0: the camera's own
   CameraFormat format = CameraFormat::kAuto;
   int buffers = 4;
   StampPoint stamp_point = StampPoint::kAuto;
   double readout_s = 0;             // from the first row to the last; 0: global shutter or unknown
   std::int64_t time_offset_us = 0;  // added to every image's time
-  double stall_s = 1.0;             // no frame for so long: the stream is started anew
+  double stall_s = 1.0;             // without a frame for this time the stream is restarted
   ExposureOptions exposure;
 };
 
-// What is known of one image.
+// Data of one image.
 struct CameraFrame {
   std::int64_t utime = 0;         // mid-exposure of the middle row, CLOCK_MONOTONIC, microseconds
-  std::int64_t sequence = 0;      // gaps are frames that never came
+  std::int64_t sequence = 0;      // a gap is a lost frame
   std::int32_t exposure_us = -1;  // -1 unknown
   float gain = -1.0F;             // the camera's own steps; -1 unknown
 };
@@ -59,10 +59,10 @@ struct CameraFrame {
 struct CameraCounts {
   std::int64_t frames = 0;           // given out
   std::int64_t missing = 0;          // gaps in the driver's numbers
-  std::int64_t flagged = 0;          // the driver said the content is damaged
+  std::int64_t flagged = 0;          // marked as damaged by the driver
   std::int64_t undecodable = 0;      // too short, or no JPEG
   std::int64_t times_backwards = 0;  // a time not after the one before it
-  std::int64_t times_unknown = 0;    // in no clock that is known: the time of arrival was taken
+  std::int64_t times_unknown = 0;    // of no known clock; the time of arrival stands in
   std::int64_t opened = 0, lost = 0, stalled = 0;
 };
 
@@ -70,7 +70,7 @@ struct CameraEvent {
   enum class Kind : std::uint8_t { kStreaming, kAbsent, kRefused, kLost, kStalled } kind{};
   const char* what = "";  // static text: what failed, or what was expected
   int error = 0;          // errno, 0 for none
-  // kStreaming: what was agreed upon.
+  // kStreaming: the negotiated format.
   CameraFormat format = CameraFormat::kAuto;
   double rate_hz = 0;  // 0 unknown
   bool exposure_known = false;
@@ -79,14 +79,14 @@ struct CameraEvent {
 class Camera {
  public:
   virtual ~Camera() = default;
-  // Waits at most timeout_ms for an image. False where none came: the camera is away (it is looked for again
-  // by itself), or what came could not be used and was counted.
+  // Waits at most timeout_ms for an image. Returns false without one: the camera is absent (it is searched
+  // again here), or the frame was refused and counted.
   [[nodiscard]] virtual bool next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame) = 0;
   [[nodiscard]] virtual bool is_streaming() const = 0;
   [[nodiscard]] virtual const CameraCounts& counts() const = 0;
-  // Called on the capture thread; must not block. Before the first next().
+  // Sets the listener, before the first next(). The capture thread calls it; it must not block.
   virtual void on_event(std::function<void(const CameraEvent&)> listener) = 0;
-  // Any thread, at any time: takes effect with the next image.
+  // Callable from any thread at any time; takes effect with the next image.
   virtual void set_exposure(const ExposureOptions& options) = 0;
 };
 

@@ -1,6 +1,5 @@
-// What drives a live camera (live_camera.h): one device that is opened, streamed from and closed, any number
-// of times. All calls are of the capture thread. Errors are negative errno, with *what (static text) telling
-// what failed.
+// The driver below a live camera (live_camera.h): one device that is opened, streamed from and closed, any
+// number of times. Capture thread only. Errors are negative errno; *what (static text) names the failed step.
 #pragma once
 
 #include "drivers/camera/camera.h"
@@ -12,24 +11,24 @@ class CameraDevice {
  public:
   virtual ~CameraDevice() = default;
 
-  // Looks for the camera anew and starts its stream: kStreaming with what was agreed upon, else kAbsent or
-  // kRefused with the reason, and close() is to follow.
+  // Searches the camera and starts its stream. Returns kStreaming with the negotiated format, else kAbsent or
+  // kRefused with the reason; the caller then calls close().
   [[nodiscard]] virtual CameraEvent open() = 0;
-  // Of whatever state.
+  // Allowed in every state.
   virtual void close() = 0;
 
-  // While it streams, all below. After the first images no heap call of Farpoint's.
+  // All calls below require a running stream. Farpoint makes no heap call in them after the first images.
 
-  // Readable when take() has something to give or to tell.
+  // Readable when take() has a frame or an error.
   [[nodiscard]] virtual int fd() const = 0;
-  // The oldest image that has come; its bytes hold until give_back(). -EAGAIN: none has come. Any other error
-  // ends the stream.
+  // Takes the oldest finished frame; its bytes are valid until give_back(). -EAGAIN: none is finished. Any
+  // other error ends the stream.
   [[nodiscard]] virtual int take(RawFrame* raw, const char** what) = 0;
-  // What take() gave. An error ends the stream.
+  // Returns the frame of take() to the driver. An error ends the stream.
   [[nodiscard]] virtual int give_back(const char** what) = 0;
-  // An image that could be used was given back: where the exposure is AutoExposure's, it follows.
+  // Feeds AutoExposure, where it is in use, with an accepted image. Called after give_back().
   virtual void adapt_exposure(const ipc::GreyImage& image) = 0;
-  // For this stream and all later ones.
+  // Applies to this stream and all later ones.
   virtual void set_exposure(const ExposureOptions& options) = 0;
 };
 

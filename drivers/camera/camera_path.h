@@ -1,7 +1,7 @@
-// Which device node a camera is, however it was named:
+// Finds the device node of a camera by one of three names:
 //   /dev/video0           a path
 //   by-id:NAME            of /dev/v4l/by-id
-//   usb:1-2.3             whatever camera is plugged into this USB port (lsusb -t, /sys/bus/usb/devices)
+//   usb:1-2.3             the camera in this USB port (lsusb -t, /sys/bus/usb/devices)
 #pragma once
 
 #include <array>
@@ -9,16 +9,16 @@
 
 namespace farpoint::drivers {
 
-// Finds the node without a heap call: a camera that was unplugged comes back under another number.
+// Finds the node without a heap call. A replugged camera may get another number, so the search is repeated.
 class CameraPath {
  public:
-  // `root` stands before /dev and /sys; tests have their own.
+  // `root` is put before /dev and /sys, for tests.
   explicit CameraPath(std::string name, std::string root = "");
 
-  // "" where `name` can be used, else what is wrong with it and what was expected.
+  // Returns "" for a usable name, else the error and the expected forms.
   [[nodiscard]] static std::string check(const std::string& name);
 
-  // The path to open; null where no such camera is there now. Valid until the next call.
+  // Returns the path to open, null without such a camera. Valid until the next call.
   [[nodiscard]] const char* find();
 
  private:

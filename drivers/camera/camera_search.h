@@ -1,5 +1,5 @@
-// When a camera that is away is looked for again, and what is told of it: each state once, the tries at
-// intervals that double.
+// Schedules the search for an absent camera and reports each change of state once. Intervals between tries
+// double up to 1 s. Capture thread; no heap call.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@ class CameraSearch {
  public:
   void on_event(std::function<void(const CameraEvent&)> listener) { tell_ = std::move(listener); }
 
-  // How long until the next try; 0: now. Rounded up: what is left of a millisecond must not become a busy
-  // loop.
+  // Returns the time until the next try; 0: now. Rounded up, so that a fraction of a millisecond causes no
+  // busy loop.
   [[nodiscard]] int wait_ms(std::int64_t now_us) const {
     constexpr std::int64_t kMicrosPerMilli = 1000;
     const std::int64_t left_us = next_try_us_ - now_us;
@@ -32,7 +32,7 @@ class CameraSearch {
     next_try_us_ = now_us + retry_us_;
     retry_us_ = std::min(2 * retry_us_, kLongestRetry_us);
   }
-  // It gives images: the next loss is a new story.
+  // Call when images arrive: the next search begins with the shortest interval.
   void works() { retry_us_ = kFirstRetry_us; }
 
  private:

@@ -1,7 +1,7 @@
-// From a driver's time stamp to an image's time: mid-exposure of its middle row, CLOCK_MONOTONIC.
+// Converts a driver's time stamp to the image's time: mid-exposure of its middle row, CLOCK_MONOTONIC.
 //
-// Documents do not say reliably which clock a stamp is of, so it is found out: an image that has just arrived
-// was taken a moment ago, and only one clock says so.
+// Documents do not state reliably which clock a stamp is of. The clock is therefore detected: an image that
+// has just arrived was taken a moment ago, which holds in one clock only.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace farpoint::drivers {
 
-// Readings of one moment, microseconds.
+// All clocks at one moment, microseconds.
 struct ClockReadings {
   std::int64_t monotonic_us = 0, boottime_us = 0, realtime_us = 0;
 };
@@ -19,16 +19,16 @@ struct ClockReadings {
 enum class SourceClock : std::uint8_t { kUnknown, kMonotonic, kBoottime, kRealtime };
 [[nodiscard]] const char* to_string(SourceClock clock);
 
-// The clock by which `stamp_us` is of the last moments before `now`. Where monotonic and boottime agree (the
-// machine was never suspended) it is monotonic. kUnknown: none.
+// Returns the clock in which `stamp_us` lies just before `now`. Monotonic wins where monotonic and boottime
+// agree (no suspend since boot). kUnknown: no clock fits.
 [[nodiscard]] SourceClock detect_clock(std::int64_t stamp_us, const ClockReadings& now);
 
-// The stamp by CLOCK_MONOTONIC. Precondition: clock is known. `now` gives the clocks' distance, anew for each
-// stamp, so that a system time that is set moves nothing but the stamps taken before and read after it.
+// Converts the stamp to CLOCK_MONOTONIC. Precondition: the clock is not kUnknown. `now` is read for each
+// stamp: setting the system clock affects only stamps taken before and read after it.
 [[nodiscard]] std::int64_t to_monotonic(std::int64_t stamp_us, SourceClock clock, const ClockReadings& now);
 
-// What is added to a stamp for the middle of the exposure of the middle row. exposure_us below 0: unknown,
-// taken as 0.
+// Returns the offset from a stamp to the middle of the exposure of the middle row. A negative exposure_us
+// (unknown) counts as 0.
 [[nodiscard]] std::int64_t mid_exposure_shift_us(StampPoint point, double exposure_us, double readout_s);
 
 }  // namespace farpoint::drivers

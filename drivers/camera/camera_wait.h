@@ -1,4 +1,4 @@
-// A capture thread's one wait and its clocks, so that tests can let time pass.
+// The one wait of a capture thread and its clocks. Tests replace both.
 #pragma once
 
 #include "drivers/camera/camera_time.h"
@@ -8,7 +8,7 @@ namespace farpoint::drivers {
 class CameraWait {
  public:
   virtual ~CameraWait() = default;
-  // Until fd is readable, or timeout_ms are over, or a signal came. fd -1: only waits.
+  // Returns when fd is readable, after timeout_ms, or at a signal. fd -1: timeout only.
   virtual void wait(int fd, int timeout_ms);
   [[nodiscard]] virtual ClockReadings clocks() { return read_clocks(); }
 };

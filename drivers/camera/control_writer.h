@@ -1,5 +1,5 @@
-// Sets a camera's controls on a thread of its own: a camera takes as long as it likes over it (over USB, a
-// transfer and its answer), and the capture thread is not to wait for that.
+// Sets a camera's controls on a thread of its own (fp-controls). A control call may block for a USB transfer
+// and its answer; the capture thread must not wait for it.
 #pragma once
 
 #include <pthread.h>
@@ -15,28 +15,29 @@ namespace farpoint::drivers {
 struct ControlValue {
   std::uint32_t id = 0;
   std::int32_t value = 0;
-  bool taken = false;  // by the camera
+  bool taken = false;  // accepted by the camera
 };
 
 class ControlWriter {
  public:
-  static constexpr std::size_t kMost = 2;  // controls at a time
-  // Sets one control; false where the camera does not take it. Called on the writer's thread, may block.
+  static constexpr std::size_t kMost = 2;  // controls in one start()
+  // Sets one control; false where the camera refuses it. Runs on the writer's thread and may block.
   using Set = std::function<bool(int fd, const ControlValue& control)>;
 
-  // Throws std::runtime_error where no thread can be had.
+  // Throws std::runtime_error where no thread can be created.
   explicit ControlWriter(Set set);
-  // Waits for the call under way.
+  // Waits for the running call.
   ~ControlWriter();
   ControlWriter(const ControlWriter&) = delete;
   ControlWriter& operator=(const ControlWriter&) = delete;
 
-  // All of one thread. Neither of the next two waits.
-  // False, with nothing done, while the ones before are under way, or were not asked for by finished().
+  // One thread makes all calls below. start() and finished() do not wait.
+  // Starts setting the controls. Returns false without effect while earlier ones run, or until finished() has
+  // returned them.
   [[nodiscard]] bool start(int fd, std::span<const ControlValue> controls);
-  // Once for each start(), when it is over: the same controls, each taken or not. Else empty.
+  // Returns the controls of start() once when they are done, each taken or not. Empty otherwise.
   [[nodiscard]] std::span<const ControlValue> finished();
-  // Until nothing is under way; forgets what came of it. Before the descriptor is closed.
+  // Waits until no call runs and drops its result. Call it before the descriptor is closed.
   void wait();
 
  private:
@@ -49,7 +50,7 @@ class ControlWriter {
   int fd_ = -1;
   std::array<ControlValue, kMost> controls_;
   std::size_t count_ = 0;
-  std::atomic<State> state_{State::kIdle};  // whose turn it is: the thread's while kWanted
+  std::atomic<State> state_{State::kIdle};  // the writer's thread owns controls_ while kWanted
   pthread_t thread_{};
 };
 

@@ -1,4 +1,4 @@
-// Hands new exposure options from any thread to the capture thread, which never waits for them.
+// Passes new exposure options from any thread to the capture thread. The capture thread never waits.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,8 @@ class ExposureMailbox {
     options_ = options;
     full_.store(true, std::memory_order_release);
   }
-  // The capture thread: false where there is nothing new, or somebody is just writing it (ask again later).
+  // Capture thread: returns false without new options, and while another thread writes them (they follow at
+  // the next call).
   [[nodiscard]] bool take(ExposureOptions* options) {
     if (!full_.load(std::memory_order_acquire)) return false;
     const std::unique_lock lock(mutex_, std::try_to_lock);

@@ -1,12 +1,11 @@
-// Threads that libraries start without saying how.
+// Stack and priority of threads that libraries start without attributes.
 #pragma once
 
 namespace farpoint::drivers {
 
-// From now on such threads of this process get a stack of 1 MB, since locked memory means all of each (8 MB
-// by default), and stand one below the calling thread where that has a real-time priority. Inheriting the
-// same one would let a library's thread that spins on a device that has gone keep the very thread off its
-// core that would notice.
+// Sets the default of this process: a stack of 1 MB (locked memory holds all of each stack, 8 MB otherwise),
+// and a real-time priority one below the calling thread's. With equal priority, a library's thread that spins
+// on a removed device would keep the capture thread off its core.
 void limit_foreign_threads();
 
 }  // namespace farpoint::drivers

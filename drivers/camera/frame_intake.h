@@ -1,5 +1,5 @@
-// What becomes of a driver's buffer, whichever driver filled it: its number is followed, its time mapped, its
-// pixels copied to grey, and what cannot be used is counted. No heap call after the first image.
+// Turns a driver's buffer into an image: follows its number, converts its time, copies its pixels to grey,
+// and counts refused frames. Capture thread; no heap call after the first image.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace farpoint::drivers {
 
-// A filled buffer in the driver's own terms.
+// A filled buffer as the driver describes it.
 struct RawFrame {
   std::span<const std::uint8_t> bytes;
   CameraFormat format = CameraFormat::kAuto;
   int row_stride = 0;
-  bool damaged = false;        // as the driver says
-  std::uint32_t sequence = 0;  // starts anew with each stream
-  std::int64_t stamp_us = 0;   // by a clock that is to be found out
-  // What the stamp stands for; nothing: it is the image's time already.
+  bool damaged = false;        // marked by the driver
+  std::uint32_t sequence = 0;  // restarts with each stream
+  std::int64_t stamp_us = 0;   // of a clock that is detected
+  // The moment that the stamp marks; empty: the stamp is the image's time already.
   std::optional<StampPoint> stamp_point;
   double exposure_us = -1.0;  // below 0: unknown
   float gain = -1.0F;         // the same
@@ -27,16 +27,16 @@ struct RawFrame {
 
 class FrameIntake {
  public:
-  // Takes size, readout and time offset from the options.
+  // Uses size, readout and time offset of the options.
   explicit FrameIntake(const CameraOptions& options) : options_(options) {}
 
-  // A new stream: the driver's numbers start anew, ours go on.
+  // Begins a new stream: the driver's numbers restart, the image's numbers continue.
   void start_stream() { last_driver_sequence_.reset(); }
-  // False where the frame cannot be used; why is counted. `now` was read when the frame came.
+  // Returns false for a refused frame and counts the reason. `now` was read when the frame arrived.
   [[nodiscard]] bool take(const RawFrame& raw, const ClockReadings& now, ipc::GreyImage* image,
                           CameraFrame* frame);
 
-  // Those that concern frames are kept here, those of coming and going by whoever owns this.
+  // This class keeps the counts of frames; its owner keeps opened, lost and stalled.
   CameraCounts counts;
 
  private:

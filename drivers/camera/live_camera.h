@@ -1,5 +1,5 @@
-// A live camera, whatever drives it: opened, streamed from, and looked for again when it was lost or gives no
-// more images.
+// A live camera over any CameraDevice. Opens it, streams from it, and searches it again after a loss or a
+// stall.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace farpoint::drivers {
 
 class LiveCamera final : public Camera {
  public:
-  // Opens nothing yet: a camera that is not there is no mistake.
+  // Does not open the device: an absent camera is no error.
   LiveCamera(const CameraOptions& options, std::unique_ptr<CameraDevice> device,
              std::unique_ptr<CameraWait> wait = std::make_unique<CameraWait>());
 
@@ -43,7 +43,7 @@ class LiveCamera final : public Camera {
   ExposureMailbox new_exposure_;
   bool streaming_ = false;
   std::int64_t stall_us_;
-  std::int64_t last_frame_us_ = 0;  // when the stream last gave anything
+  std::int64_t last_frame_us_ = 0;  // time of the last frame
 };
 
 }  // namespace farpoint::drivers

@@ -1,5 +1,5 @@
-// The cameras' pixel layouts to 8-bit grey: one pass over the driver's memory, front to back, since that may
-// be uncached. False where the bytes are too few; the image is then untouched.
+// Converts pixel layouts of cameras to 8-bit grey in one pass, front to back, since the driver's memory may
+// be uncached. Returns false for too few bytes; the image is then unchanged.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct PixelLayout {
   int row_stride = 0;  // bytes from row to row of the source
 };
 
-// GREY, and the luma of NV12, which lies in front as just such rows.
+// GREY, and the luma of NV12, which comes first in the same layout.
 [[nodiscard]] bool grey_rows_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout,
                                      ipc::GreyImage* image);
 // Y0 U Y1 V: every other byte.
@@ -24,7 +24,7 @@ struct PixelLayout {
 [[nodiscard]] bool rgb24_to_grey(std::span<const std::uint8_t> bytes, const PixelLayout& layout,
                                  ipc::GreyImage* image);
 
-// Mean over a coarse grid: what an exposure control needs of an image.
+// Mean over a coarse grid, the input of exposure control.
 [[nodiscard]] double mean_grey(const ipc::GreyImage& image);
 
 }  // namespace farpoint::drivers

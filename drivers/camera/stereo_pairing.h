@@ -1,6 +1,5 @@
-// Two cameras' images matched by time. An image whose partner does not come goes on alone, and is counted:
-// the frame is then monocular. Fixed memory, no lock, no clock of its own; whoever owns it calls from one
-// thread.
+// Matches the images of two cameras by time. An image without a partner becomes a monocular frame and is
+// counted. Fixed memory, no lock, no clock; all calls come from one thread.
 #pragma once
 
 #include <array>
@@ -11,19 +10,19 @@
 namespace farpoint::drivers {
 
 struct StereoOptions {
-  // Largest distance of partners. Below half a frame period, or it is not clear who belongs to whom.
+  // Largest time difference within a pair. Must be below half a frame period, or the match is ambiguous.
   std::int64_t tolerance_us = 5'000;
-  // How long after its arrival an image waits for a partner of which nothing is known yet.
+  // Longest wait of an image for a partner, from its arrival.
   std::int64_t patience_us = 20'000;
 };
 
-// One image of one camera; the pixels lie where its owner knows by the slot.
+// One image of one camera; the slot identifies its pixels to the caller.
 struct StereoImage {
   std::int64_t utime = 0;  // mid-exposure
   std::uint32_t slot = 0;
 };
 
-// Both, or one alone.
+// A pair, or one image alone.
 struct StereoFrame {
   std::optional<StereoImage> left, right;
   [[nodiscard]] bool is_pair() const { return left && right; }
@@ -32,7 +31,7 @@ struct StereoFrame {
 
 struct StereoCounts {
   std::int64_t pairs = 0, left_alone = 0, right_alone = 0;
-  // Not taken: a time not after the one before it, or not after a frame that has gone on already.
+  // Refused: the time is not after the previous image's, or not after that of a frame already returned.
   std::int64_t late = 0;
 };
 
@@ -42,20 +41,21 @@ class StereoPairing {
 
   explicit StereoPairing(const StereoOptions& options) : options_(options) {}
 
-  // An image has come at `now_us`, by the clock of the images. False where it cannot be used (counted): its
-  // slot is the caller's again. Precondition: what take() has to give was taken since the last put().
+  // Adds an image that arrived at `now_us` (clock of the images). Returns false for a refused image
+  // (counted); its slot returns to the caller. Precondition: take() was called until false since the last
+  // put().
   [[nodiscard]] bool put(Side side, const StereoImage& image, std::int64_t now_us);
-  // The next frame, in the order of their times; false where none is decided. Call again after due_us().
+  // Returns the next frame in order of time; false while none is decided. Call again after due_us().
   [[nodiscard]] bool take(std::int64_t now_us, StereoFrame* frame);
-  // When an image that waits will wait no longer; nothing: none waits.
+  // Time at which a waiting image becomes a frame alone; empty: none waits.
   [[nodiscard]] std::optional<std::int64_t> due_us() const;
-  // A camera that is known to be away is not waited for.
+  // Images do not wait for partners from an absent camera.
   void set_away(Side side, bool away) { queue(side).away = away; }
 
   [[nodiscard]] const StereoCounts& counts() const { return counts_; }
 
  private:
-  static constexpr std::size_t kWaiting = 8;  // of one side: more than any patience holds
+  static constexpr std::size_t kWaiting = 8;  // of one side; more than patience_us admits
 
   struct Waiting {
     StereoImage image;
@@ -80,7 +80,7 @@ class StereoPairing {
 
   StereoOptions options_;
   Queue left_, right_;
-  std::optional<std::int64_t> gone_utime_;  // of the last frame that was given out
+  std::optional<std::int64_t> gone_utime_;  // of the last frame returned
   StereoCounts counts_;
 };
 

@@ -189,7 +189,7 @@ void SocketCan::maintain() {
 void SocketCan::note_failure(int error) {
   ++counts_.not_sent;
   counts_.last_errno = error;
-  // A full queue says nothing of the bus but that nobody acknowledges: error frames tell which.
+  // A full queue means only that no node acknowledges; error frames give the bus state.
   if (error == ENOBUFS || error == EAGAIN) ++counts_.queue_full;
   if (error == ENETDOWN) state_ = CanState::kDown;
   if (is_absent(error)) {

@@ -1,5 +1,5 @@
-// A raw SocketCAN socket that never blocks, and outlives its interface: a bus that is not there, goes down or
-// is unplugged is looked for again.
+// A raw SocketCAN socket that never blocks. It survives its interface: an absent, downed or removed one is
+// searched again by maintain(). One thread makes all calls.
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,19 @@
 namespace farpoint::drivers {
 
 enum class CanState : std::uint8_t {
-  kUnknown = 0,  // nothing was sent or heard yet
+  kUnknown = 0,  // nothing was sent or received yet
   kActive = 1,
-  kWarning = 2,  // the controller has seen many errors
-  kPassive = 3,  // it may not disturb the bus any more
-  kBusOff = 4,   // it takes no part until it is started again (restart-ms)
+  kWarning = 2,  // error counters above the warning limit
+  kPassive = 3,  // error-passive
+  kBusOff = 4,   // off the bus until restarted (restart-ms)
   kDown = 5,     // the interface is down
-  kAbsent = 6,   // there is no such interface, or it cannot do CAN FD and is to
+  kAbsent = 6,   // no such interface, or one without the required CAN FD
 };
 [[nodiscard]] const char* to_string(CanState state);
 
 struct CanCounts {
   std::uint64_t sent = 0;
-  std::uint64_t not_sent = 0;    // of them:
+  std::uint64_t not_sent = 0;    // includes queue_full
   std::uint64_t queue_full = 0;  // the transmit queue had no room
   std::uint64_t received = 0;
   std::uint64_t error_frames = 0, bus_off = 0, reopened = 0;
@@ -32,32 +32,32 @@ struct CanCounts {
 };
 
 struct CanOptions {
-  // Identifiers that receive() is to give; the kernel keeps all others away.
+  // Identifiers that receive() returns; the kernel filters all others.
   std::vector<std::uint32_t> wanted_ids;
-  // Whether an interface that is not there yet is waited for, or an error.
+  // An interface absent at the start: true waits for it, false makes it an error.
   bool wait_for_interface = false;
-  // Frames are sent as CAN FD's, with the faster bit rate in their data, and such frames are received too.
+  // Sends CAN FD frames with bit rate switching, and receives them too.
   bool fd = false;
 };
 
 class SocketCan {
  public:
-  // Throws std::runtime_error saying what is missing: a kernel with CAN, the privilege, and unless it is
-  // waited for the interface.
+  // Throws std::runtime_error naming what is missing: a kernel with CAN, the privilege, or, without
+  // wait_for_interface, the interface.
   explicit SocketCan(const std::string& interface, const CanOptions& options = {});
-  // A socket that is there already, for tests; it is not opened again.
+  // Uses an existing socket, for tests; it is never reopened.
   SocketCan(int fd, const CanOptions& options);
   ~SocketCan();
   SocketCan(const SocketCan&) = delete;
   SocketCan& operator=(const SocketCan&) = delete;
 
-  // Sends all frames in order. A frame that the kernel does not take at once is counted and given up: the
-  // next epoch carries newer data. True where all were taken. No allocation.
+  // Sends all frames in order. A frame that the kernel refuses is counted and dropped, since the next epoch
+  // carries newer data. Returns true if all were accepted. No allocation.
   bool send(std::span<const ipc::CanFrame> frames);
-  // A frame that has arrived, and how long ago, or false where there is none. Error frames go into state()
-  // and counts(); remote and extended frames are passed over. No allocation.
+  // Returns an arrived frame and its age; false without one. Error frames update state() and counts(); remote
+  // and extended frames are skipped. No allocation.
   [[nodiscard]] bool receive(ipc::CanFrame* frame, std::int64_t* age_us);
-  // Where the interface is away, looks for it; call about once a second. No allocation.
+  // Searches an absent interface; call it about once a second. No allocation.
   void maintain();
 
   [[nodiscard]] CanState state() const { return state_; }

@@ -1,4 +1,4 @@
-// Wheel speeds out of CAN frames, named by message and signal of a DBC file.
+// Reads wheel speeds from CAN frames, by message and signal of a DBC file.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace farpoint::drivers {
 
 class WheelReader {
  public:
-  // As read_wheel_signals() takes them. Throws std::runtime_error saying what was expected.
+  // Arguments as for read_wheel_signals(). Throws std::runtime_error with what was expected.
   WheelReader(const std::string& dbc_path, const std::string& names);
 
-  // True where the frame completes a measurement: every wheel heard since the last one. A wheel that says
+  // Returns true when the frame completes a measurement: every wheel received since the last one. A wheel
   // 'not available' is NaN; the vehicle's speed is the mean of the others. No allocation.
   [[nodiscard]] bool take(const ipc::CanFrame& frame, std::int64_t utime, wheels_t* message);
 
-  // Identifiers to listen to.
+  // Identifiers of the frames to receive.
   [[nodiscard]] std::vector<std::uint32_t> ids() const;
 
  private:

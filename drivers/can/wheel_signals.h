@@ -1,4 +1,4 @@
-// Which signals of a vehicle's DBC file are the speeds of its wheels.
+// Finds the wheel speed signals of a vehicle's DBC file.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ struct WheelSignal {
 };
 
 // `names`: "MESSAGE.SIGNAL, ..." one to four, in the order front left, front right, rear left, rear right.
-// Their unit must be m/s or km/h. Throws std::runtime_error saying what was expected.
+// Their unit must be m/s or km/h. Throws std::runtime_error with what was expected.
 [[nodiscard]] std::vector<WheelSignal> read_wheel_signals(const std::string& dbc_path,
                                                           const std::string& names);
 

@@ -1,4 +1,5 @@
-// Wheel speeds as CAN frames, named by message and signal of a DBC file: what WheelReader reads.
+// Writes wheel speeds into CAN frames, by message and signal of a DBC file. WheelReader reads the same
+// frames.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +14,16 @@ namespace farpoint::drivers {
 
 class WheelWriter {
  public:
-  // As read_wheel_signals() takes them. Throws std::runtime_error saying what was expected.
+  // Arguments as for read_wheel_signals(). Throws std::runtime_error with what was expected.
   WheelWriter(const std::string& dbc_path, const std::string& names);
 
-  // One frame for each message of the DBC, in the order in which they are named; valid until the next call.
-  // Of more wheels than signals the last ones are left out; of fewer, or not a number, signals stay as they
-  // were, at first at 0 m/s.
+  // Returns one frame for each DBC message, in the order of the names; valid until the next call. Surplus
+  // wheels are left out. A missing wheel or NaN keeps the signal's previous value, initially 0 m/s.
   [[nodiscard]] std::span<const ipc::CanFrame> frames(const wheels_t& message);
 
-  // Speeds that their signal could not hold, and that were put at its limit or, not a number, left out.
+  // Speeds outside their signal's range (clamped) and NaN (left out), since the start.
   [[nodiscard]] std::uint64_t limited() const { return limited_; }
-  // Whether some message is longer than a classic frame.
+  // True if a message is longer than a classic frame.
   [[nodiscard]] bool needs_fd() const;
 
  private:

@@ -1,8 +1,7 @@
-// From libcamera's thread to the capture thread: which requests are finished, and that the camera was
-// removed.
+// Passes finished requests, and the removal of the camera, from libcamera's thread to the capture thread.
 //
-// libcamera's signals only do this much. The ring is fixed: a request is in it at most once, so it cannot
-// overflow. Nobody waits for anybody; the capture thread waits for fd() to become readable.
+// A fixed ring: it holds each request at most once, so it cannot overflow. push() does not wait; the capture
+// thread waits until fd() is readable.
 #pragma once
 
 #include <sys/eventfd.h>
@@ -23,7 +22,7 @@ class FinishedRequests {
   FinishedRequests(const FinishedRequests&) = delete;
   FinishedRequests& operator=(const FinishedRequests&) = delete;
 
-  // libcamera's thread. False where somebody broke the promise of the ring: then nothing was stored.
+  // libcamera's thread. Returns false without storing when a request breaks the ring's bounds.
   bool push(std::uint32_t request) {
     const std::uint32_t end = end_.load(std::memory_order_relaxed);
     if (request >= kMaxRequests || end - begin_.load(std::memory_order_acquire) >= kMaxRequests) return false;
@@ -38,10 +37,10 @@ class FinishedRequests {
     wake();
   }
 
-  // The capture thread, all below. Readable while something is there to be taken.
+  // Capture thread, all below. Readable while the ring holds a request or a removal.
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool was_removed() const { return removed_.load(std::memory_order_acquire); }
-  // The oldest; false where there is none.
+  // Takes the oldest request; false without one.
   [[nodiscard]] bool take(std::uint32_t* request) {
     std::uint64_t one = 0;
     if (read(fd_, &one, sizeof one) < 0) return false;
@@ -51,7 +50,7 @@ class FinishedRequests {
     begin_.store(begin + 1, std::memory_order_release);
     return true;
   }
-  // While nothing can push.
+  // Only while no thread can push.
   void clear() {
     for (std::uint64_t one = 0; read(fd_, &one, sizeof one) > 0;) continue;
     begin_.store(end_.load());
@@ -59,7 +58,7 @@ class FinishedRequests {
   }
 
  private:
-  // The descriptor counts one for each thing to be taken. It is non-blocking, and cannot fill up.
+  // The descriptor counts one for each entry. It is non-blocking and cannot overflow.
   void wake() {
     const std::uint64_t one = 1;
     [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);

@@ -1,13 +1,13 @@
 // A camera by libcamera.
 //
-// libcamera's signals arrive on a thread of its own and only pass on the number of the finished request
-// (finished_requests.h); all else is the capture thread's, whose one wait is for that. Frames are copied
-// once, out of buffers that were mapped when the stream began, and the request is queued again at once.
+// libcamera's signals arrive on its own thread and only pass on the number of the finished request
+// (finished_requests.h). The capture thread does the rest and waits for that number only. Frames are copied
+// once, from buffers mapped at the start of the stream; the request is then queued again.
 //
-// Heap: while it streams this makes no heap call after the first images. libcamera itself does, on the
-// calling thread, when a request is queued again: it empties and fills lists of controls, and sends its own
-// thread a message, under a mutex of its own that is held for some instructions. Finding and starting a
-// camera allocates, and may take as long as libcamera needs to look through all devices.
+// Heap: this class makes no heap call after the first images of a stream. libcamera does, on the calling
+// thread, when a request is queued: it rebuilds lists of controls and posts a message to its thread, under a
+// mutex held for some instructions. Opening and starting a camera allocates and may take as long as libcamera
+// needs to enumerate all devices.
 #pragma once
 
 #include <memory>
@@ -26,7 +26,7 @@ class LibcameraDevice final : public CameraDevice {
   LibcameraDevice(const LibcameraDevice&) = delete;
   LibcameraDevice& operator=(const LibcameraDevice&) = delete;
 
-  // "" where options.device can name a camera of libcamera's, else what is wrong and what was expected.
+  // Returns "" where options.device can name a camera of libcamera, else the error and the expected form.
   [[nodiscard]] static std::string check(const std::string& name);
 
   [[nodiscard]] CameraEvent open() override;

@@ -1,4 +1,4 @@
-// Exposure and gain of a libcamera camera: which controls the next requests carry.
+// Chooses the exposure and gain controls of the next requests of a libcamera camera.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@ namespace farpoint::drivers {
 
 class LibcameraExposure {
  public:
-  // What the first request is to carry.
+  // Controls of the first request.
   [[nodiscard]] LibcameraSetting start(const ExposureOptions& options, const LibcameraStream& stream);
-  // After each image; nothing where all stays as it is.
+  // Call after each image. Returns empty where nothing changes.
   [[nodiscard]] std::optional<LibcameraSetting> update(double mean_grey);
   [[nodiscard]] bool needs_brightness() const { return automatic_.has_value(); }
 
-  // As set last; nothing where the camera does as it likes.
+  // As set last; empty under the camera's automatic.
   [[nodiscard]] std::optional<double> exposure_us() const { return exposure_us_; }
   [[nodiscard]] std::optional<int> gain() const { return gain_; }
 

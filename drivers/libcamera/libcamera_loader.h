@@ -8,11 +8,12 @@
 
 namespace farpoint::drivers {
 
-// Where it lies: lib/farpoint beside the program's own folder, in a build folder as on a system.
+// Returns lib/farpoint beside the program's folder, both in a build folder and on a system.
 [[nodiscard]] std::string libcamera_module_path();
 
-// Before other threads are started and memory is locked. Null with *problem filled where there is no such
-// module, libcamera is not there, or they are not of one build. Once loaded it stays: libcamera has threads.
+// Call before other threads start and memory is locked. Returns null and fills *problem without the module,
+// without libcamera, or with a module of another build. A loaded module stays loaded, since libcamera has
+// threads.
 [[nodiscard]] std::unique_ptr<LibcameraSystem> load_libcamera(const std::string& path, std::string* problem);
 
 }  // namespace farpoint::drivers

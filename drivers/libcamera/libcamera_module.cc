@@ -1,5 +1,5 @@
-// libcamera behind the border of libcamera_system.h: the module that farpointd loads. Written against 0.0.3
-// with calls that later versions still have; where they differ, LIBCAMERA_VERSION_* or the type says so.
+// Implements libcamera_system.h by libcamera: the module that farpointd loads. Written against 0.0.3 with
+// calls that later versions keep; LIBCAMERA_VERSION_* or types select where they differ.
 #include <libcamera/libcamera.h>
 #include <linux/dma-buf.h>
 #include <sys/ioctl.h>
@@ -99,7 +99,7 @@ class Mapping {
  private:
   void fence(std::uint64_t edge) {
     dma_buf_sync sync{edge | DMA_BUF_SYNC_READ};
-    // Memory that is no DMA buffer needs none, and says so.
+    // Memory that is no DMA buffer needs no synchronisation and returns an error.
     (void)ioctl(fd_, DMA_BUF_IOCTL_SYNC, &sync);
   }
 

@@ -1,7 +1,6 @@
-// What Farpoint needs of libcamera, in plain types: the border of a module of its own. libcamera pulls in
-// libraries that farpointd would have to lock in memory whether it uses them or not, so that only the module
-// links it, and only a configuration that asks for it loads the module (libcamera_loader.h). Tests stand in
-// for it at the same border.
+// The part of libcamera that Farpoint uses, in plain types: the interface of the module. Only the module
+// links libcamera, since its libraries would be locked in farpointd's memory unused; only camera.driver
+// libcamera loads the module (libcamera_loader.h). Tests implement the same interface.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +16,17 @@ namespace farpoint::drivers {
 // Gains are in hundredths: 100 is libcamera's 1.0.
 constexpr double kLibcameraGainUnit = 0.01;
 
-// What was agreed upon.
+// The negotiated stream.
 struct LibcameraStream {
   int row_stride = 0;
   int requests = 0;  // each has one buffer
-  // Which controls the camera has.
+  // Controls that the camera has.
   bool has_auto_exposure = false;  // that can be switched on and off
   bool has_exposure = false, has_gain = false, has_frame_duration = false;
   ExposureRange range;  // of what it has
 };
 
-// Controls to be set; those without a value stay as they are. Setting one that the camera has not is an
-// error.
+// Controls to set; empty ones stay unchanged. Setting a control that the camera lacks is an error.
 struct LibcameraSetting {
   std::optional<bool> auto_exposure;
   std::optional<std::int32_t> exposure_us;
@@ -40,32 +38,32 @@ struct LibcameraSetting {
 struct LibcameraFrame {
   enum class Status : std::uint8_t { kOk, kDamaged, kCancelled } status = Status::kOk;
   std::span<const std::uint8_t> bytes;  // of the plane that holds luma, or everything
-  std::uint32_t sequence = 0;           // of the driver: gaps are frames that never came
+  std::uint32_t sequence = 0;           // of the driver; a gap is a lost frame
   std::int64_t stamp_us = 0;
-  std::int32_t exposure_us = -1;  // as the camera reports it; -1: it does not
+  std::int32_t exposure_us = -1;  // as the camera reports it; -1: not reported
   int gain = -1;
 };
 
-// Errors are negative errno, with *what (static text) telling what failed. All calls are of one thread.
+// Errors are negative errno; *what (static text) names the failed step. One thread makes all calls.
 class LibcameraSystem {
  public:
   virtual ~LibcameraSystem() = default;
-  // Looks for the camera anew and takes it: by libcamera's id, or as a number in the order of its list.
-  // -ENOENT: it is not there. Until close(), libcamera's thread may write to `finished`.
+  // Searches the camera, by libcamera's id or by its number in libcamera's list, and acquires it. -ENOENT: no
+  // such camera. Until close(), libcamera's thread may write to `finished`.
   [[nodiscard]] virtual int open(const char* name, FinishedRequests* finished, const char** what) = 0;
-  // Of whatever state: stops, gives everything back. Blocks until libcamera's threads have let go.
+  // Allowed in every state. Stops and releases everything; blocks until libcamera's threads have finished.
   virtual void close() = 0;
-  // Just this format and size, or -ENOTSUP. Buffers are made and mapped.
+  // Requires this format and size, else -ENOTSUP. Allocates and maps the buffers.
   [[nodiscard]] virtual int configure(CameraFormat format, int width_px, int height_px, int buffers,
                                       LibcameraStream* stream, const char** what) = 0;
   // Queues all requests.
   [[nodiscard]] virtual int start(const LibcameraSetting& setting, const char** what) = 0;
   virtual void read(std::uint32_t request, LibcameraFrame* frame) = 0;
-  // Queues a request that was finished, with what is to be set from it on.
+  // Queues a finished request again, with the controls to set from it on.
   [[nodiscard]] virtual int give_back(std::uint32_t request, const LibcameraSetting& setting) = 0;
 };
 
-// What the module exports, by these names. A module of another build is refused by its number.
+// Names that the module exports. The interface number refuses a module of another build.
 constexpr int kLibcameraInterface = 1;
 using LibcameraInterfaceFunction = int (*)();
 using MakeLibcameraFunction = LibcameraSystem* (*)();

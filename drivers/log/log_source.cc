@@ -126,7 +126,7 @@ bool LogSource::judge_image(int camera, std::uint64_t offset, LogItem* item) {
   if (s.holds && utime >= s.held.utime) {
     s.holds = false;
     if (utime == s.held.utime) {
-      ++counts_.times_backwards;  // the same once more bears it out too
+      ++counts_.times_backwards;  // the same time again confirms it too
     } else {
       waiting_camera_ = camera;
       waiting_offset_ = offset;
@@ -162,7 +162,7 @@ void LogSource::give_image(image_t* image, int camera, std::uint64_t offset, Log
   item->image = &given_;
 }
 
-// What no later image can bear out any more.
+// A held image that no later one can confirm.
 bool LogSource::give_held_at_end(LogItem* item) {
   for (int camera = 0; camera < kMaxCameras; ++camera) {
     CameraStream& s = camera_streams_[static_cast<std::size_t>(camera)];

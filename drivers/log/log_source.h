@@ -1,7 +1,8 @@
-// A recorded LCM log as the source of measurements: in the order of the file, checked, with counts of what
-// was refused. An image whose time leaps waits until the next one bears it out (kMaxLeap_us).
+// Reads the measurements of a recorded LCM log, in the order of the file, checked, with counts of refused
+// ones. An image whose time leaps waits until the next image confirms it (kMaxLeap_us). Not thread-safe;
+// waits for the disk.
 //
-// A measurement's time is its message's utime; the log event's time is only when it was recorded.
+// A measurement's time is its message's utime; the log event's time is that of the recording.
 #pragma once
 
 #include <array>
@@ -17,27 +18,27 @@
 namespace farpoint::drivers {
 
 struct LogSourceCounts {
-  // Given out.
+  // Returned.
   std::uint64_t images = 0, imu = 0, wheels = 0, calibrations = 0, ground_truths = 0;
   // Refused.
   std::uint64_t messages_undecodable = 0;  // damaged LCM messages on known channels
-  // The calibration has no such camera, or channel and message disagree.
+  // No such camera in the calibration, or channel and message disagree.
   std::uint64_t images_unknown_camera = 0;
-  std::uint64_t images_wrong_size = 0;   // not the calibration's, or not what the message itself says
+  std::uint64_t images_wrong_size = 0;   // differs from the calibration or from the message's own size
   std::uint64_t images_undecodable = 0;  // damaged JPEG or PNG, unknown pixel format
-  // Not after the one before it, or a leap ahead that what follows does not bear out.
+  // Not after the previous one, or a leap that the next image does not confirm.
   std::uint64_t times_backwards = 0;
   std::uint64_t imu_invalid = 0;            // not finite, or beyond any sensor's range
   std::uint64_t wheels_invalid = 0;         // infinite
   std::uint64_t ground_truths_invalid = 0;  // not finite, or no rotation
-  // Passed over: other channels.
+  // Skipped: other channels.
   std::uint64_t others = 0;
 };
 
 enum class LogItemKind : std::uint8_t { kImage, kImu, kWheels, kCalibration, kGroundTruth };
 
-// One measurement. The pointer that its kind names is set, the others are null; what it points to is the
-// source's and holds until its next call.
+// One measurement. The pointer of its kind is set, the others are null. The source owns the target, which is
+// valid until the next call.
 struct LogItem {
   LogItemKind kind = LogItemKind::kImage;
   std::int64_t utime = 0;
@@ -53,19 +54,18 @@ struct LogItem {
 class LogSource {
  public:
   static constexpr int kMaxCameras = 8;
-  // An IMU that leaps further ahead than this is believed only with its next message: one damaged time must
-  // not make all that follow look old. An image is held back already where it comes late by half of the
-  // camera's pace, until the next one bears it out or not; at the end of the log it is believed up to this
-  // leap.
+  // An IMU time further ahead than this is accepted only with its next message: one damaged time must not
+  // make all later ones look old. An image that is late by half of the camera's period is held until the next
+  // one confirms it; at the end of the log it is accepted up to this leap.
   static constexpr std::int64_t kMaxLeap_us = 2'000'000;
 
   // "-" is standard input. Throws std::runtime_error naming the log where it cannot be opened.
   explicit LogSource(const std::string& path) : reader_(path) {}
 
-  // The next measurement that passes the checks, images that were held back behind what came between; false
-  // at the end. From the first calibration on, images are held against it.
+  // Returns the next measurement that passes the checks; false at the end. A held image follows the
+  // measurements read meanwhile. From the first calibration on, images are checked against it.
   [[nodiscard]] bool next(LogItem* item);
-  // Decodes an image item; counts it where it fails. Precondition: next() has not been called since.
+  // Decodes an image item and counts a failure. Precondition: no next() since the item was returned.
   [[nodiscard]] ipc::ImageStatus decode(const LogItem& item, ipc::GreyImage* image);
 
   [[nodiscard]] const LogSourceCounts& counts() const { return counts_; }
@@ -76,15 +76,15 @@ class LogSource {
   // Times of one stream.
   struct Stream {
     static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
-    std::int64_t last = kNone;      // given out last
-    std::int64_t doubtful = kNone;  // leapt ahead, not yet borne out
+    std::int64_t last = kNone;      // returned last
+    std::int64_t doubtful = kNone;  // leapt ahead, not confirmed yet
   };
 
   // Images of one camera.
   struct CameraStream {
-    std::int64_t last = Stream::kNone;  // given out last
-    std::int64_t pace_us = 0;           // between two of them; 0: not known yet
-    bool holds = false;                 // held, not yet borne out
+    std::int64_t last = Stream::kNone;  // returned last
+    std::int64_t pace_us = 0;           // between two images; 0: unknown yet
+    bool holds = false;                 // held, not confirmed yet
     image_t held{};
     std::uint64_t held_offset = 0;
   };
@@ -107,7 +107,7 @@ class LogSource {
   ipc::ImageDecoder decoder_;
   LogSourceCounts counts_;
   std::array<CameraStream, kMaxCameras> camera_streams_;
-  int waiting_camera_ = -1;  // image_ is this camera's, and comes after the held one that it bore out
+  int waiting_camera_ = -1;  // camera of image_, which follows the held image that it confirmed
   std::uint64_t waiting_offset_ = 0;
   Stream imu_stream_, wheels_stream_, ground_truth_stream_;
   bool has_calibration_ = false;

@@ -17,7 +17,7 @@ void V4l2Exposure::start(V4l2System* system, int fd, const ExposureOptions& opti
   *this = {};
   system_ = system;
   fd_ = fd;
-  // Whoever sets the exposure, the frame rate is not to pay for it.
+  // The exposure must not lower the frame rate, in every mode.
   set(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0);
   if (options.mode == ExposureMode::kCamera || !take_manual_control()) {
     leave_to_camera();
@@ -36,7 +36,7 @@ void V4l2Exposure::leave_to_camera() {
   if (!set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_AUTO))
     set(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY);
   set(V4L2_CID_AUTOGAIN, 1);
-  // The camera changes it as it likes: what it reads now says nothing of later images.
+  // The camera changes it freely: the present value does not hold for later images.
   exposure_us_.reset();
 }
 

@@ -1,4 +1,4 @@
-// Exposure and gain of a V4L2 camera, by whichever of the controls it has.
+// Sets exposure and gain of a V4L2 camera by the controls that it has. Capture thread.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@ namespace farpoint::drivers {
 
 class V4l2Exposure {
  public:
-  // Asks the camera what it can do, and sets what the options want.
+  // Queries the camera's ranges and applies the options. May block.
   void start(V4l2System* system, int fd, const ExposureOptions& options);
-  // After each image: what the automatic wants of the next ones. Does not wait for the camera, which may take
-  // some images to follow.
+  // Call after each image: runs the automatic exposure for the next ones. Does not wait for the camera, which
+  // may follow some images later.
   void update(double mean_grey);
 
-  // Of the images to come; nothing where the camera does not say.
+  // Of the next images; empty where the camera does not report it.
   [[nodiscard]] std::optional<double> exposure_us() const { return exposure_us_; }
   [[nodiscard]] std::optional<int> gain() const { return gain_; }
   [[nodiscard]] bool needs_brightness() const { return automatic_.has_value(); }
@@ -30,7 +30,7 @@ class V4l2Exposure {
   [[nodiscard]] std::optional<std::int64_t> get(std::uint32_t id);
   void leave_to_camera();
   [[nodiscard]] bool take_manual_control();
-  // As the camera takes it: exposure, and gain where it has one.
+  // The setting in the camera's controls: exposure, and gain where it has one.
   [[nodiscard]] std::span<const ControlValue> controls_for(const ExposureSetting& setting);
   void note(const ControlValue& control);
   void apply(const ExposureSetting& setting);
@@ -40,7 +40,7 @@ class V4l2Exposure {
   bool has_gain_ = false;
   ExposureRange range_;
   ExposureSetting applied_;
-  bool under_way_ = false;  // the camera has not taken applied_ yet
+  bool under_way_ = false;  // applied_ is not set in the camera yet
   std::array<ControlValue, ControlWriter::kMost> controls_;
   std::optional<AutoExposure> automatic_;
   std::optional<double> exposure_us_;

@@ -1,4 +1,4 @@
-// Which of its formats a V4L2 camera is asked for.
+// Negotiates the format of a V4L2 camera.
 #pragma once
 
 #include <array>
@@ -9,11 +9,11 @@
 
 namespace farpoint::drivers {
 
-// An open node that can stream images.
+// An open node that streams images.
 struct V4l2Node {
   int fd = -1;
   bool multiplanar = false;       // luma is then in the first plane
-  std::array<char, 17> driver{};  // as it calls itself
+  std::array<char, 17> driver{};  // its name for itself
   [[nodiscard]] std::uint32_t buffer_type() const;
 };
 
@@ -23,11 +23,11 @@ struct AgreedFormat {
   double rate_hz = 0;  // 0: unknown
 };
 
-// Checks what the node can do. 0, or negative errno with *what telling what failed.
+// Checks the node's capabilities. Returns 0, or negative errno; *what names the failed step.
 [[nodiscard]] int identify(V4l2System* system, V4l2Node* node, const char** what);
 
-// Sets format and rate: the size must be that of the options; of the formats that reach the rate (or else
-// come nearest) the one that costs least to turn into grey. 0, or negative errno.
+// Sets format and rate. The size must be that of the options. Of the formats that reach the rate, or come
+// nearest, the one cheapest to convert to grey wins. Returns 0 or negative errno.
 [[nodiscard]] int agree_on_format(V4l2System* system, const V4l2Node& node, const CameraOptions& options,
                                   AgreedFormat* agreed, const char** what);
 

@@ -79,7 +79,7 @@ void V4l2Output::require_output() {
     fail("is no video device", status);
   const bool of_node = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0;
   const std::uint32_t can = of_node ? capability.device_caps : capability.capabilities;
-  // v4l2loopback with exclusive_caps=1 says so only while nobody writes.
+  // v4l2loopback with exclusive_caps=1 reports it only without a writer.
   if ((can & V4L2_CAP_VIDEO_OUTPUT) == 0)
     fail("is no video output device, expected one of v4l2loopback that no other program writes to");
   if ((can & V4L2_CAP_STREAMING) == 0) fail("is an output device that cannot stream");

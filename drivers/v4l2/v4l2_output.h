@@ -1,4 +1,4 @@
-// Grey images into a V4L2 output device, such as v4l2loopback makes them.
+// Writes grey images into a V4L2 output device, such as v4l2loopback's.
 #pragma once
 
 #include <array>
@@ -13,20 +13,21 @@ namespace farpoint::drivers {
 
 struct OutputFormat {
   int width_px = 0, height_px = 0;
-  double rate_hz = 0.0;  // told to the device, which need not care
+  double rate_hz = 0.0;  // passed to the device, which may ignore it
 };
 
 class V4l2Output {
  public:
-  // Opens the device and starts its stream. Throws std::runtime_error naming the device and what it lacks.
+  // Opens the device and starts its stream. Throws std::runtime_error naming the device and the missing
+  // capability.
   V4l2Output(std::string device, const OutputFormat& format, std::unique_ptr<V4l2System> system);
   ~V4l2Output();
   V4l2Output(const V4l2Output&) = delete;
   V4l2Output& operator=(const V4l2Output&) = delete;
 
-  // Hands over one image, with its own time (CLOCK_MONOTONIC) as its stamp. 0; -EAGAIN where the device still
-  // holds all of its buffers: the same image may be sent again later; another negative errno where the stream
-  // has ended. Precondition: as many pixels as the format says.
+  // Sends one image with its time (CLOCK_MONOTONIC) as stamp. Returns 0; -EAGAIN while the device holds all
+  // buffers (the image may be sent again later); another negative errno after the end of the stream.
+  // Precondition: width times height pixels.
   [[nodiscard]] int send(std::span<const std::uint8_t> grey, std::int64_t stamp_us);
 
  private:
@@ -52,7 +53,7 @@ class V4l2Output {
   int fd_ = -1;
   std::size_t row_stride_ = 0, image_bytes_ = 0;
   std::array<Mapping, kBuffers> mappings_{};
-  std::size_t buffers_ = 0;  // that the device gave
+  std::size_t buffers_ = 0;  // allocated by the device
   std::size_t free_ = 0;     // not with the device
   std::size_t next_ = 0;     // to be filled
   bool streaming_ = false;

@@ -1,4 +1,4 @@
-// The driver's buffers of one streaming V4L2 node: mapped, handed out, given back.
+// Maps the driver's buffers of one streaming V4L2 node, takes filled ones and returns them.
 #pragma once
 
 #include <array>
@@ -9,10 +9,10 @@
 
 namespace farpoint::drivers {
 
-// A filled buffer; the driver's again after give_back().
+// A filled buffer, valid until give_back().
 struct V4l2Buffer {
   std::uint32_t index = 0;
-  std::span<const std::uint8_t> bytes;  // what the driver filled
+  std::span<const std::uint8_t> bytes;  // filled by the driver
   std::int64_t stamp_us = 0;
   std::uint32_t flags = 0, sequence = 0;
 };
@@ -26,9 +26,9 @@ class V4l2Stream {
   V4l2Stream(const V4l2Stream&) = delete;
   V4l2Stream& operator=(const V4l2Stream&) = delete;
 
-  // Negative errno with *what telling what failed, else 0.
+  // Returns 0, or negative errno; *what names the failed step.
   [[nodiscard]] int start(int buffers, const char** what);
-  // -EAGAIN where no buffer is filled.
+  // Takes the oldest filled buffer; -EAGAIN without one.
   [[nodiscard]] int take(V4l2Buffer* buffer);
   [[nodiscard]] int give_back(const V4l2Buffer& buffer);
 

@@ -1,4 +1,4 @@
-// The system calls that a V4L2 camera needs, so that tests can be the kernel.
+// The system calls of a V4L2 camera. Tests implement them in place of the kernel.
 #pragma once
 
 #include <cstddef>
@@ -9,20 +9,19 @@
 
 namespace farpoint::drivers {
 
-// As the calls of the same name; errors are negative errno. No heap calls.
+// Each method wraps the call of its name; errors are negative errno. No heap calls.
 class V4l2System {
  public:
   virtual ~V4l2System() = default;
   [[nodiscard]] virtual int open(const char* path) = 0;
   virtual void close(int fd) = 0;
-  // Repeated where a signal came in between.
+  // Repeats the call after a signal.
   [[nodiscard]] virtual int ioctl(int fd, unsigned long request, void* argument) = 0;
-  // Null where it cannot be mapped.
+  // Returns null on failure.
   [[nodiscard]] virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;
   virtual void unmap(void* memory, std::size_t bytes) = 0;
 
-  // VIDIOC_S_CTRL without waiting for the camera, as ControlWriter says it. close() waits for what is under
-  // way.
+  // VIDIOC_S_CTRL without waiting for the camera; see ControlWriter. close() waits for a running call.
   [[nodiscard]] virtual bool start_controls(int fd, std::span<const ControlValue> controls) = 0;
   [[nodiscard]] virtual std::span<const ControlValue> finished_controls() = 0;
   virtual void wait_for_controls() = 0;

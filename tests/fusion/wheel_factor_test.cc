@@ -113,7 +113,7 @@ TEST(WheelFactor, ResidualIsInSigmas) {
   EXPECT_NEAR(r[2], -2.0, 1e-12);
 }
 
-// A monocular map of unknown scale: images say nothing of metres, wheels do.
+// A monocular map of unknown scale: images carry no metres, wheels do.
 TEST(WheelWindow, TheScaleOfAMonocularMapComesOutRight) {
   WheelScene s(small_scene(1, 0.3), kScale_m_per_unit, 1.0);
   s.globals[1].fixed = true;
@@ -147,7 +147,7 @@ TEST(WheelWindow, SchurAndCeresEndAtTheSamePlace) {
     EXPECT_LT(a.poses[i].T_world_body.boxminus_to(b.poses[i].T_world_body).norm(), 1e-4) << i;
 }
 
-// One slipped motion is told from the others by the Huber loss.
+// One slipped motion is rejected by the Huber loss.
 TEST(WheelWindow, ASlippedWheelHardlyMovesTheScale) {
   WheelScene s(small_scene(1, 0.3), kScale_m_per_unit, 1.0);
   s.globals[1].fixed = true;

@@ -27,7 +27,7 @@ Descriptor with_bits(int n) {
 
 class FindDescriptorTest : public testing::Test {
  protected:
-  // A feature whose descriptor has so many bits more than the query's.
+  // A feature whose descriptor differs from the query's by `distance` bits.
   void add(float u, float v, int distance, int level = 0) {
     Feature f;
     f.u_px = u, f.v_px = v;

@@ -9,8 +9,8 @@ namespace farpoint::test {
 [[nodiscard]] bool counts_allocations();
 // malloc, calloc, realloc and aligned allocation so far.
 [[nodiscard]] std::uint64_t allocations();
-// Told of each of them from now on, and of free and mmap, by the thread that calls; null: nobody is. What it
-// calls itself it is told of too.
+// Sets a listener for these calls, and for free and mmap, on the calling thread; null removes it. The
+// listener's own calls reach it too.
 void on_heap_call(void (*listener)());
 
 }  // namespace farpoint::test

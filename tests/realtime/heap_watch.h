@@ -6,8 +6,8 @@
 
 namespace farpoint::test {
 
-// Counts from now on, from zero, where counts_allocations() (tests/ipc/allocations.h); a thread is told by
-// its name when it first calls.
+// Counts from now on, from zero, where counts_allocations() (tests/ipc/allocations.h); a thread is identified
+// by its name at its first call.
 void watch_heap();
 void stop_watching_heap();
 // malloc, calloc, realloc, aligned allocation, free and mmap by threads of this name while watched.

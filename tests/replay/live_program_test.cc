@@ -18,7 +18,7 @@ TEST(LiveProgram, WaitsForACameraThatIsNotThereAndStopsWhenItIsTold) {
       " --set camera.device=/dev/video-none --set control.socket=none --set lcm.enabled=false "
       "--set camera.calibration=" +
       test::source_dir() + "/config/cameras/tum-freiburg1.yaml > " + said + " 2>&1 & daemon=$!; ";
-  // Until it says so, at most half a minute; then it is told.
+  // Waits for the log line, at most half a minute; then sends the signal.
   const std::string wait = "for i in $(seq 300); do grep -q 'starting -> no_camera' " + said +
                            " && break; sleep 0.1; done; kill -TERM $daemon; wait $daemon";
   EXPECT_EQ(run(start + wait), 0);

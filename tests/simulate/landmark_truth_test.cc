@@ -41,7 +41,7 @@ class LandmarkTruth : public testing::Test {
     return {Eigen::Quaterniond::Identity(), map_to_world_.S_world_map.inverse() * p_world};
   }
 
-  // One landmark a pixel, right but for a factor on its distance.
+  // One landmark a pixel, right except for a factor on its distance.
   landmarks_t landmarks_at(const std::vector<Eigen::Vector2d>& pixels, double factor, float relative_sigma) {
     const slam::SE3 camera = simulation->body().pose_at(kFrame / kRate_hz) * simulation->T_body_camera(0);
     const std::vector<simulate::SeenPoint> seen = simulation->look(kFrame, 0, pixels);

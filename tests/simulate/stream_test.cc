@@ -33,7 +33,7 @@
 namespace farpoint::tools::simulate {
 namespace {
 
-// Time passes only where it is slept, or where a test says so.
+// Time passes only in sleeps, or by a call of the test.
 class FakeClock final : public PaceClock {
  public:
   [[nodiscard]] std::int64_t now_us() override { return time_us; }
@@ -437,7 +437,7 @@ TEST(StreamProgram, ASignalEndsItInOrder) {
   EXPECT_FALSE(utimes_of(log).of["IMU"].empty());
 }
 
-// liblcm adds a line of its own where it does not know a provider.
+// liblcm adds a line of its own for an unknown provider.
 std::int64_t lines_of_farpoint(const std::string& err) {
   std::istringstream lines(err);
   std::int64_t count = 0;

@@ -1,5 +1,5 @@
 // A rigid scene as tracking meets it: a local view of its landmarks, and frames with their features from any
-// pose. Exact but for what a test disturbs, so that expected values need no tolerance for noise.
+// pose. Exact except what a test disturbs, so that expected values need no tolerance for noise.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -356,7 +356,7 @@ TEST(Expectation, AMissingFigureBreaksIt) {
 TEST(Expectation, WrongOnesAreRefused) {
   const auto runs = two_runs();
   for (const char* condition :
-       {"", "vmp.ate", "vmp.ate <", "vmp.ate ! 3", "vmp.ate <> 3", "nobody.ate < 3", "vmp.nothing < 3",
+       {"", "vmp.ate", "vmp.ate <", "vmp.ate ! 3", "vmp.ate <> 3", "nothing.ate < 3", "vmp.nothing < 3",
         "vmp.ate < x vmp.ate", "vmp.ate < 1 2 3", "3 < vmp.ate", "vmp.ate < nan"}) {
     EXPECT_THROW((void)check_expectation(condition, runs), InputError) << condition;
   }

@@ -1,12 +1,18 @@
 #!/usr/bin/env python3
-"""The tree is the architecture: checks which folder may include which, and the length of files.
+"""The tree is the architecture: checks which folder may include which, the length of files, and READMEs.
 
-usage: check_tree.py [FOLDER]      Prints one line a finding; status 1 where there is one.
+usage: check_tree.py [--warnings] [FOLDER]      Prints one line a finding; status 1 where there is one.
+
+--warnings also prints, without a change of the status, what is hard to hold in the head: files over 500 lines, classes
+that hold invariants over 20 members, folders over 20 units.
 """
 
+import argparse
 import pathlib
 import re
 import sys
+
+import check_readmes
 
 # What each folder may include besides itself. Arrows run one way:
 # geometry <- image <- map <- solver <- {tracking, mapping, loops, fusion} <- the facade <- daemon.
@@ -53,6 +59,12 @@ MAX_LINES = 650
 LENGTH_WAIVER = re.compile(r"Long file: \S+")
 CHECKED_LENGTHS = {".cc", ".h", ".py", ".lcm", ".txt", ".cmake"}
 
+# Limits of warnings, each with the comment that lifts it.
+LINES_TO_WARN, MEMBERS_TO_WARN, UNITS_TO_WARN = 500, 20, 20
+CLASS_WAIVER = re.compile(r"Large class: \S+")
+FOLDER_WAIVER = re.compile(r"Large folder: \S+")  # in the folder's README
+TOPS = ("slam", "ipc", "drivers", "daemon", "tools", "tests")
+
 INCLUDE = re.compile(r'^\s*#\s*include\s+("[^"]+"|<[^>]+>)')
 
 
@@ -90,7 +102,7 @@ def include_problem(path: str, target: str):
     shared = target in SHARED_MAY_INCLUDE and folder in SHARED_READERS
     shared = shared or (target in SHARED_WITH_TOOLS and folder == "tools")
     if other != folder and other not in allowed and not shared:
-        return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'nothing but itself'}"
+        return f"{target}: {folder} may include {', '.join(sorted(allowed)) or 'only itself'}"
     return None
 
 
@@ -111,14 +123,14 @@ def check_includes(root: pathlib.Path):
 
 
 def check_headers(root: pathlib.Path):
-    for top in ("slam", "ipc", "drivers", "daemon", "tools", "tests"):
+    for top in TOPS:
         for file in sorted((root / top).rglob("*.h")):
             if not re.search(r"^#pragma once$", file.read_text(), re.MULTILINE):
                 yield f"{file.relative_to(root).as_posix()}: no '#pragma once'"
 
 
 def check_lengths(root: pathlib.Path):
-    for top in ("slam", "ipc", "drivers", "daemon", "tools", "tests"):
+    for top in TOPS:
         for file in sorted((root / top).rglob("*")):
             if file.suffix not in CHECKED_LENGTHS or not file.is_file() or "node_modules" in file.parts:
                 continue
@@ -129,15 +141,103 @@ def check_lengths(root: pathlib.Path):
                        "say why not in a comment 'Long file: ...'")
 
 
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+CLASS = re.compile(r"^[ \t]*class (?:\[\[\w+\]\] )?(\w+)[^;{()]*\{", re.MULTILINE)
+# One declaration of data members: `type name_ = ..., other_;`. Members of a class end in '_'.
+MEMBER = re.compile(r"\b\w+_(?=\s*(?:[=;,{\[]|$))")
+NO_MEMBER = re.compile(r"\b(?:static|using|typedef|friend|return)\b")
+
+
+def body_of(text: str, begin: int) -> str:
+    """What stands between the brace at `begin` and its partner."""
+    depth = 0
+    for place in range(begin, len(text)):
+        depth += {"{": 1, "}": -1}.get(text[place], 0)
+        if depth == 0:
+            return text[begin + 1:place]
+    return text[begin + 1:]
+
+
+def without_braces(text: str) -> str:
+    """The text without what stands in braces and parentheses: initialisers, bodies, arguments."""
+    kept, depth = [], 0
+    for letter in text:
+        if letter in "{(":
+            depth += 1
+        elif letter in "})":
+            depth -= 1
+            kept.append(";" if letter == "}" and depth == 0 else " ")
+        elif depth == 0:
+            kept.append(letter)
+    return "".join(kept)
+
+
+def data_members(text: str, class_start: "re.Match[str]"):
+    """Names of the data members of one class, in order."""
+    statements = without_braces(body_of(text, class_start.end() - 1)).split(";")
+    names = [name for statement in statements if not NO_MEMBER.search(statement)
+             for name in MEMBER.findall(statement.split("=")[0] if "," not in statement else statement)]
+    return list(dict.fromkeys(names))
+
+
+def warn_of_classes(root: pathlib.Path):
+    for top in TOPS:
+        for file in sorted((root / top).rglob("*.h")):
+            text = file.read_text()
+            if CLASS_WAIVER.search(text):
+                continue
+            code = COMMENT.sub("", text)
+            for start in CLASS.finditer(code):
+                count = len(data_members(code, start))
+                if count > MEMBERS_TO_WARN:
+                    yield (f"{file.relative_to(root).as_posix()}: class {start.group(1)} has {count} members, more than "
+                           f"{MEMBERS_TO_WARN}: split it, or say why not in a comment 'Large class: ...'")
+
+
+def warn_of_lengths(root: pathlib.Path):
+    for top in TOPS:
+        for file in sorted((root / top).rglob("*")):
+            if file.suffix not in CHECKED_LENGTHS or not file.is_file() or "node_modules" in file.parts:
+                continue
+            text = file.read_text()
+            lines = text.count("\n")
+            if LINES_TO_WARN < lines <= MAX_LINES and not LENGTH_WAIVER.search(text):
+                yield f"{file.relative_to(root).as_posix()}: {lines} lines, more than {LINES_TO_WARN}"
+
+
+def warn_of_folders(root: pathlib.Path):
+    """A unit is x.h with x.cc, or one of them alone."""
+    for top in TOPS:
+        folders = [root / top, *sorted(path for path in (root / top).rglob("*") if path.is_dir())]
+        for folder in (path for path in folders if path.is_dir()):
+            units = {file.stem for file in folder.iterdir() if file.suffix in (".cc", ".h")}
+            readme = folder / "README.md"
+            if len(units) <= UNITS_TO_WARN or readme.is_file() and FOLDER_WAIVER.search(readme.read_text()):
+                continue
+            yield (f"{folder.relative_to(root).as_posix()}: {len(units)} units, more than {UNITS_TO_WARN}: split it, or "
+                   "say why not in its README 'Large folder: ...'")
+
+
+def warnings(root: pathlib.Path):
+    return [*warn_of_classes(root), *warn_of_lengths(root), *warn_of_folders(root)]
+
+
 def check(root: pathlib.Path):
     return [*check_includes(root), *check_headers(root), *check_lengths(root)]
 
 
 def main():
-    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parents[2])
+    parser = argparse.ArgumentParser(usage=__doc__.split("usage: ")[1], add_help=False)
+    parser.add_argument("--warnings", action="store_true")
+    parser.add_argument("root", nargs="?", type=pathlib.Path, default=pathlib.Path(__file__).parents[2])
+    options = parser.parse_args()
+    root = options.root
     if not (root / "slam").is_dir():
         sys.exit(f"check_tree.py: {root}: no folder slam, expected the root of the repository")
-    findings = check(root)
+    if options.warnings:
+        for warning in warnings(root):
+            print(f"warning: {warning}")
+    findings = check(root) + check_readmes.check(root)
     for finding in findings:
         print(finding)
     sys.exit(1 if findings else 0)

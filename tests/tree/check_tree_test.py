@@ -9,14 +9,14 @@ import check_tree
 
 
 class CheckTree(unittest.TestCase):
-    def findings(self, files):
+    def findings(self, files, of=check_tree.check):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
             (root / "slam").mkdir()
             for path, text in files.items():
                 (root / path).parent.mkdir(parents=True, exist_ok=True)
                 (root / path).write_text(text)
-            return check_tree.check(root)
+            return of(root)
 
     def assert_refused(self, path, line, word):
         found = self.findings({path: line + "\n"})
@@ -71,6 +71,36 @@ class CheckTree(unittest.TestCase):
         self.assertIn("lines", self.findings({"tests/map/a.cc": lines})[0])
         self.assertEqual(self.findings({"tests/map/a.cc": "// Long file: one table.\n" + lines}), [])
         self.assertEqual(self.findings({"tests/map/a.cc": lines[1:]}), [])
+
+    def warnings(self, files):
+        return self.findings(files, check_tree.warnings)
+
+    def test_large_classes_are_warned_of(self):
+        members = "".join(f"  int a{i}_ = f(b_, {{c_}});\n" for i in range(check_tree.MEMBERS_TO_WARN))
+        clutter = "  static int s_;\n  int f() const { return x_ + y_; }\n  // int commented_;\n"
+        text = "#pragma once\nclass A final : public B {\n" + clutter + members + "};\n"
+        self.assertEqual(self.warnings({"slam/map/a.h": text}), [])
+        more = text.replace("  static", "  std::map<int, C> z_, y_{};\n  static")
+        self.assertIn(f"class A has {check_tree.MEMBERS_TO_WARN + 2} members", self.warnings({"slam/map/a.h": more})[0])
+        self.assertEqual(self.warnings({"slam/map/a.h": more + "// Large class: one table.\n"}), [])
+        self.assertEqual(self.findings({"slam/map/a.h": more}), [])
+
+    def test_structs_hold_no_invariants(self):
+        members = "".join(f"  int a{i}_;\n" for i in range(2 * check_tree.MEMBERS_TO_WARN))
+        self.assertEqual(self.warnings({"slam/map/a.h": "#pragma once\nstruct A {\n" + members + "};\n"}), [])
+
+    def test_longish_files_are_warned_of(self):
+        lines = "\n" * (check_tree.LINES_TO_WARN + 1)
+        self.assertIn("more than 500", self.warnings({"tests/map/a.cc": lines})[0])
+        self.assertEqual(self.warnings({"tests/map/a.cc": lines[1:]}), [])
+        self.assertEqual(self.warnings({"tests/map/a.cc": "// Long file: one table.\n" + lines}), [])
+
+    def test_large_folders_are_warned_of(self):
+        files = {f"ipc/a{i}.cc": "" for i in range(check_tree.UNITS_TO_WARN)} | {"ipc/a0.h": ""}
+        self.assertEqual(self.warnings(files), [])
+        files["ipc/b.cc"] = ""
+        self.assertIn("ipc: 21 units", self.warnings(files)[0])
+        self.assertEqual(self.warnings(files | {"ipc/README.md": "Large folder: one type each."}), [])
 
 
 if __name__ == "__main__":

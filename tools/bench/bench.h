@@ -15,11 +15,11 @@ struct BenchOptions {
   std::size_t passes = 3;
 };
 
-// Called after every frame: passes begun, and how much of this one is done (0..1; negative: not known).
+// Called after every frame with the passes begun and the share of this one done (0..1; negative: unknown).
 using BenchProgress = std::function<void(std::size_t pass, double share)>;
 
-// Measures until `passes` calm passes are there, twice as many at most. Throws InputError where the log or
-// the configuration cannot be used.
+// Measures until `passes` undisturbed passes exist, at most twice that number. Throws InputError for an
+// unusable log or configuration.
 [[nodiscard]] BenchReport run_bench(const BenchOptions& options, const daemon::Config& config,
                                     const BenchProgress& progress);
 

@@ -1,7 +1,7 @@
-// From the times of single frames to what `farpoint bench` prints.
+// Computes the output of `farpoint bench` from the times of single frames.
 //
-// Times mean something only against those of known work on the same machine at the same moment: the
-// yardstick, cv::ORB on the same frame, timed right after it.
+// Times are comparable only with those of known work on the same machine at the same moment. The yardstick is
+// cv::ORB on the same frame, timed right after it.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace farpoint::tools {
 
-// What one frame took. Stages by timing_t::STAGE_*, negative where one did not run.
+// Times of one frame. Stages by timing_t::STAGE_*, negative for one that did not run.
 struct FrameTimes {
   std::array<double, daemon::StageClock::kStages> cpu_ms{}, wall_ms{};
   double process_cpu_ms = 0;  // decoding, tracking and mapping, of all threads
@@ -28,7 +28,7 @@ struct BenchPass {
 
 struct BenchStage {
   std::string name;
-  std::size_t frames = 0;  // in which it ran
+  std::size_t frames = 0;  // frames in which it ran
   double p50_ms = 0, p99_ms = 0, max_ms = 0;
 };
 
@@ -36,26 +36,26 @@ struct BenchReport {
   double yardstick_p50_ms = 0, yardstick_p99_ms = 0;
   std::vector<BenchStage> stages;  // those that ran at all: thread CPU, then those of wall clock (NAME_wall)
   double process_cpu_ms = 0;       // mean of a frame
-  std::size_t frames = 0;          // of all passes that count
+  std::size_t frames = 0;          // of all pooled passes
   std::size_t passes = 0, passes_run = 0;
-  double disturbance = 0;  // of the worst pass that counts
+  double disturbance = 0;  // of the worst pooled pass
 };
 
-// A pass whose disturbance is larger was not alone on the machine.
+// A pass above this disturbance shared the machine with other work.
 inline constexpr double kDisturbed = 1.25;
 
-// How much slower the yardstick ran in each pass than it can: the 90th percentile, over the frames, of its
-// time against the least time it took on that frame in any pass. 1 is perfect rest. What makes one frame
-// dearer than another (more corners) drops out. Passes must have equally many frames.
+// Slowdown of the yardstick in each pass: the 90th percentile, over the frames, of its time over its least
+// time on that frame in any pass. 1 is perfect rest. Differences between frames (more corners) cancel.
+// Precondition: passes of equal length.
 [[nodiscard]] std::vector<double> disturbances(const std::vector<BenchPass>& passes);
 
-// Whether `count` passes without disturbance are there.
+// Returns true with `count` undisturbed passes.
 [[nodiscard]] bool enough_calm_passes(const std::vector<BenchPass>& passes, std::size_t count);
 
-// Pools the `count` calmest passes. Precondition: there are as many, each with frames.
+// Pools the `count` calmest passes. Precondition: at least that number, each with frames.
 [[nodiscard]] BenchReport make_report(const std::vector<BenchPass>& passes, std::size_t count);
 
-// The shape that DESIGN.md promises; a stage's yardsticks are its milliseconds over the yardstick's p50.
+// JSON of --json. A stage's yardsticks are its milliseconds over the yardstick's p50.
 [[nodiscard]] Json to_json(const BenchReport& report);
 [[nodiscard]] std::string to_text(const BenchReport& report);
 

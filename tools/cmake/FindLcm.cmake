@@ -1,4 +1,4 @@
-# LCM ships no CMake file, and its pkg-config file wants GLib's headers, which nobody here needs.
+# LCM ships no CMake file, and its pkg-config file requires GLib's headers, which Farpoint does not need.
 #   Lcm::lcm      the library          LCM_GEN   the type compiler
 find_path(LCM_INCLUDE_DIR lcm/lcm.h)
 find_library(LCM_LIBRARY lcm)

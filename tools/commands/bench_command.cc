@@ -33,7 +33,7 @@ daemon::Config load_configuration(const BenchCommandOptions& options) {
   }
 }
 
-// One bar a pass, since nobody knows how many there will be.
+// One bar a pass, since the number of passes is open.
 class PassProgress {
  public:
   void advance(std::size_t pass, double share) {

@@ -1,5 +1,5 @@
-// The sub-commands of `farpoint`. Each add_*() declares one on the command line; when it was given, the
-// function it leaves in `action` does the work and returns the exit status.
+// The sub-commands of `farpoint`. Each add_*() declares one on the command line and, if it was given, sets
+// `action`, which does the work and returns the exit status.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -19,7 +19,7 @@ void add_report_command(CLI::App* app, Action* action);
 void add_spy_command(CLI::App* app, Action* action);
 void add_simulate_command(CLI::App* app, Action* action);
 
-// The whole program: parses, runs, and turns every failure into one line on standard error and an exit
+// The whole program: parses, runs, and reports every failure by one line on standard error and an exit
 // status.
 int run_farpoint(int argc, const char* const* argv);
 

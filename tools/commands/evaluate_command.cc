@@ -63,7 +63,7 @@ EvaluationOptions to_evaluation_options(const EvaluateOptions& options) {
   return result;
 }
 
-// Runs of the same file stem are told apart by their paths.
+// Runs of the same file stem are distinguished by their paths.
 void make_names_unique(const std::vector<std::string>& files, std::vector<RunMetrics>* runs) {
   std::map<std::string, int> uses;
   for (const RunMetrics& run : *runs) ++uses[run.name];

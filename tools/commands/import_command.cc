@@ -40,7 +40,7 @@ CLI::App* add_layout(CLI::App* import, const char* name, const char* description
   layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
       ->required();
   layout->add_option("--first", options->first, "Start at this frame, counted from 0")->capture_default_str();
-  layout->add_option("--frames", options->frames, "Take so many frames; 0: all that follow")
+  layout->add_option("--frames", options->frames, "Number of frames; 0: all that follow")
       ->capture_default_str();
   return layout;
 }

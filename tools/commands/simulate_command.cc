@@ -125,7 +125,7 @@ void add_stream_options(CLI::App* command, SimulateOptions* options) {
           ->type_name("NAMES"),
       command
           ->add_option("--pace", request.pace,
-                       "So many times as fast as real time (default 1): slow or fast motion, speeds and turn "
+                       "N times as fast as real time (default 1): slow or fast motion, speeds and turn "
                        "rates are "
                        "not changed by it")
           ->check(CLI::Range(0.01, 100.0))};
@@ -161,7 +161,7 @@ void add_simulate_command(CLI::App* app, Action* action) {
       ->check(CLI::IsMember({"grey", "mjpeg"}));
   CLI::Option* pictures =
       command->add_option("--pictures", options->pictures, "Folder for some images as PNG files");
-  command->add_option("--every", options->every, "With --pictures: every so many frames (default 50)")
+  command->add_option("--every", options->every, "With --pictures: one picture every N frames (default 50)")
       ->needs(pictures)
       ->check(CLI::Range(1, 1000000));
   add_stream_options(command, options.get());

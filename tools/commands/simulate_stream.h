@@ -1,4 +1,5 @@
-// `farpoint simulate --stream`: from its options to open devices, and back to a line that says how it went.
+// `farpoint simulate --stream`: opens the devices of its options, streams, and prints a closing line with
+// lateness and pace.
 #pragma once
 
 #include <optional>
@@ -14,13 +15,13 @@ struct StreamRequest {
   std::string can_interface;              // empty: none
   std::string wheels_dbc, wheel_signals;  // as can.wheels_dbc and can.wheel_signals of the daemon
   double pace = 1.0;
-  std::string output;  // log of what was streamed; empty: none
+  std::string output;  // log of the streamed data; empty: none
 };
 
-// Throws InputError where the options do not go together.
+// Throws InputError for options that contradict each other.
 void check(const StreamRequest& request, bool stereo);
 
-// Streams to the end or a signal, and prints the line. Throws what devices complain of.
+// Streams to the end or a signal, and prints the closing line. Throws the devices' errors.
 void run_stream(const StreamRequest& request, simulate::Simulation* simulation);
 
 }  // namespace farpoint::tools

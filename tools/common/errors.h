@@ -1,5 +1,5 @@
-// The two ways in which a command of `farpoint` ends badly. Both carry one line that says what is wrong,
-// where, and what was expected; the exit status follows from the type.
+// The two kinds of failure of a command of `farpoint`. Both carry one line with what is wrong, where, and
+// what was expected; the type gives the exit status.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// A JSON value to be printed or looked into: objects keep the order in which they were filled.
+// A JSON value to print or to query. Objects keep their order of insertion.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ class Json {
   // Appends to an object. Precondition: this is an object.
   void set(std::string key, Json value);
 
-  // The value at a dotted path through objects; null pointer where there is none.
+  // Returns the value at a dotted path through objects, null pointer without one.
   [[nodiscard]] const Json* find(std::string_view dotted_path) const;
   [[nodiscard]] bool is_number() const;  // and finite
   [[nodiscard]] double number() const;   // precondition: is_number()

@@ -1,4 +1,4 @@
-// A progress bar on standard error; silent where that is no terminal.
+// A progress bar on standard error; silent unless that is a terminal.
 #pragma once
 
 #include <cstddef>

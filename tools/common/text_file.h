@@ -1,5 +1,4 @@
-// Line-oriented text files of the data sets: fields with the file and line they stand in, so that every
-// complaint can name both.
+// Line-oriented text files of the data sets. Fields carry file and line, which every error names.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +41,7 @@ class FieldLine {
 // A text file read whole. Windows line ends and a missing last line end are accepted.
 class FieldFile {
  public:
-  // Throws InputError where the file cannot be read.
+  // Throws InputError if the file cannot be read.
   FieldFile(std::filesystem::path file, std::string_view separators);
   FieldFile(const FieldFile&) = delete;
   FieldFile& operator=(const FieldFile&) = delete;
@@ -60,8 +59,8 @@ inline constexpr std::string_view kCommaAndBlanks = ", \t";
 
 // The whole file as bytes. Throws InputError.
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
-// Puts the text in the file's place, through a temporary file; "-" is standard output. Throws InputError
-// where the file cannot be opened, std::runtime_error where it cannot be written.
+// Replaces the file by the text, through a temporary file; "-" is standard output. Throws InputError if the
+// file cannot be opened, std::runtime_error if it cannot be written.
 void write_file(const std::string& file, const std::string& text);
 
 }  // namespace farpoint::tools

@@ -1,4 +1,4 @@
-// How far an estimated trajectory lies from truth: pairing, alignment, absolute and relative errors.
+// Errors of an estimated trajectory against truth: pairing, alignment, absolute and relative errors.
 //
 // Pairing and absolute error are defined as in the independent check that the tests run beside this code:
 // nearest truth pose within a tolerance, Umeyama alignment (Umeyama 1991) over all paired positions, RMS of
@@ -26,20 +26,20 @@ struct PosePair {
   std::int32_t map_id = 0;
 };
 
-// One pair for each estimate that has a truth pose at most tolerance_s away; of two equally near ones the
+// Returns one pair for each estimate with a truth pose within tolerance_s; of two equally near ones the
 // later.
 [[nodiscard]] std::vector<PosePair> pair_nearest(const Trajectory& truth, const Trajectory& estimate,
                                                  double tolerance_s = kPairingTolerance_s);
 
-// The similarity that carries map coordinates into the world's: p_world = scale * R * p_map + t.
+// The similarity from map to world coordinates: p_world = scale * R * p_map + t.
 struct MapToWorld {
   slam::Sim3 S_world_map;
   double scale = 1.0;  // of S_world_map; 1 for se3 and none
 };
 
-// Least squares over all pairs (Umeyama). planar: only x and y count, and S_world_map is a plane's similarity
-// with z passed through (times scale). An estimate that stands in one point is moved only (scale 1). Nothing
-// where there are fewer than three pairs or where truth stands in one point and a scale was asked for.
+// Least squares over all pairs (Umeyama). planar: only x and y count, and z is only scaled. An estimate in a
+// single point is only moved (scale 1). Empty with fewer than three pairs, and for truth in a single point
+// when a scale is requested.
 [[nodiscard]] std::optional<MapToWorld> align(const std::vector<PosePair>& pairs, Alignment alignment,
                                               bool planar);
 
@@ -61,8 +61,7 @@ struct SegmentError {
   double translation_percent = 0.0;
   double rotation_deg_per_m = 0.0;
 };
-// `scale`: the alignment's, applied to the estimate's translations. Nothing where the path is shorter than
-// 100 m.
+// `scale`: the alignment's, applied to the estimate's translations. Empty for a path under 100 m.
 [[nodiscard]] std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, double scale);
 
 // Relative errors over one second. Truth is interpolated at the estimate's times (a hand-held camera turns by

@@ -19,11 +19,11 @@ namespace farpoint::tools {
 
 struct ExpectationResult {
   bool holds = false;
-  std::string text;  // the condition with the values put in
+  std::string text;  // the condition with its values
 };
 
-// runs: name and to_json() of each. Throws InputError where the condition is malformed or names an unknown
-// run or metric.
+// runs: name and to_json() of each. Throws InputError for a malformed condition and for an unknown run or
+// metric.
 [[nodiscard]] ExpectationResult check_expectation(const std::string& condition,
                                                   const std::vector<std::pair<std::string, Json>>& runs);
 

@@ -1,4 +1,5 @@
-// Judged landmarks as figures: error by true distance, claims against errors, how early far ones were born.
+// Figures of judged landmarks: error by true distance, claims against errors, and how early far ones became
+// points.
 #pragma once
 
 #include <array>
@@ -18,13 +19,13 @@ struct DistanceBin {
   // Of distance, in percent of the true one: median and 90th percentile of its size, median with its sign.
   double error_p50_percent = 0.0, error_p90_percent = 0.0, bias_percent = 0.0;
   double claimed_percent = 0.0;  // median claimed sigma
-  // Spread of the error of inverse distance in claimed sigmas (1.4826 times its median size): 1 where claims
-  // are honest, more where they are too bold.
+  // Spread of the error of inverse distance in claimed sigmas (1.4826 times its median size): 1 for honest
+  // claims, more for sigmas that are too small.
   double sigmas = 0.0;
   double position_error_m = 0.0;  // median, drift of the path included
 };
 
-// When the points beyond a distance were made.
+// Age of the points beyond a distance when they were made.
 struct FarBirths {
   double beyond_m = 0.0;
   std::size_t count = 0, through_vmp = 0;

@@ -1,5 +1,5 @@
-// Landmarks of a run against the world that a simulated recording shows: the recording's SIMULATION message
-// makes that world again, and a ray through the pixel that first saw a landmark says how far it really is.
+// Judges the landmarks of a run by the world of a simulated recording. The recording's SIMULATION message
+// makes that world again; a ray through the pixel that first saw a landmark gives its true distance.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace farpoint::tools {
 
-// What the pixel shows that a landmark's bearing comes from.
+// Content of the pixel that a landmark's bearing comes from.
 enum class LandmarkTarget {
   kSurface,
   kSky,      // clouds: no depth at all
   kMoving,   // a car: depth, but no place
-  kOutline,  // near and far surfaces meet within two pixels: which of them is not told
+  kOutline,  // near and far surfaces meet within two pixels; ambiguous
 };
 
 struct JudgedLandmark {
@@ -28,16 +28,16 @@ struct JudgedLandmark {
   double relative_sigma = 0.0;    // claimed: of inverse distance, as a share of it
   double sigmas = 0.0;            // error of inverse distance in claimed sigmas
   double position_error_m = 0.0;  // in the world, after the run's alignment; drift of the path is in it
-  // From the first sighting that it holds to the keyframe at which it became a point.
+  // From its first kept sighting to the keyframe at which it became a point.
   double wait_s = 0.0, wait_m = 0.0;
   double parallax_rad = 0.0;  // true angle between those two rays
   double born_at_m = 0.0;     // true distance then
 };
 
-// Remembers the world and what was asked of it.
+// Keeps the world and the rays already cast.
 class SimulatedWorld {
  public:
-  // Throws InputError where the message's world cannot be made again.
+  // Throws InputError if the message's world cannot be made again.
   explicit SimulatedWorld(const simulation_t& message);
 
   // Every landmark of one map, in the order of the message. `truth` and `estimate` at the same point of the

@@ -10,7 +10,7 @@
 namespace farpoint::tools {
 namespace {
 
-// Depths of points less certain than this say nothing (METHOD.md).
+// Depths of points less certain than this are left out.
 constexpr double kMaxRelativeDepthSigma = 0.30;
 
 const char* scale_state_name(const Run& run) {

@@ -1,4 +1,4 @@
-// One run against truth: METHOD.md's row and more.
+// Metrics of one run against truth.
 //
 // Definitions. final: every frame's pose in the map with most frames, after the last optimisation. live: the
 // map-frame poses that were published as valid. share: poses with truth, of all frames of the recording.
@@ -22,7 +22,7 @@
 
 namespace farpoint::tools {
 
-// Which point of the vehicle is compared with truth.
+// The point of the vehicle that is compared with truth.
 enum class TruthPoint {
   kAuto,  // camera 0 where the run's scale is unknown (its body then stands there), else the body
   kBody,
@@ -49,8 +49,8 @@ struct Truth {
   std::vector<std::int64_t> frame_utimes;  // of CAMERA_0; empty where the truth is a text file
   std::shared_ptr<SimulatedWorld> world;   // of a simulated recording, where asked for
 };
-// Reads truth from a recording's log or a TUM file. `with_world`: a simulated recording's world is made
-// again, to judge landmarks by. Throws InputError, also where there is no truth in the log.
+// Reads truth from a recording's log or a TUM file. `with_world`: makes a simulated recording's world again,
+// to judge landmarks. Throws InputError, also for a log without truth.
 [[nodiscard]] Truth read_truth(const std::filesystem::path& file, bool with_world = false);
 
 // A run as given on the command line.
@@ -118,8 +118,7 @@ struct RunMetrics {
 
 [[nodiscard]] RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options);
 
-// Every figure by name; absent ones are null. Key names of the absolute error are those of the field's
-// scripts.
+// Every figure by name; absent ones are null. The absolute error has the key names of the field's scripts.
 [[nodiscard]] Json to_json(const RunMetrics& metrics);
 
 }  // namespace farpoint::tools

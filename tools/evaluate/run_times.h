@@ -1,5 +1,5 @@
-// What FARPOINT_TIMING tells of a run besides the time of tracking: how old poses were when they went out,
-// and whether time and memory stay flat over a long run.
+// Figures from FARPOINT_TIMING besides tracking's time: age of poses at output, and growth of time and memory
+// over a long run.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct TimedFrame {
 
 struct LatencyMetrics {
   double p50_ms = 0.0, p99_ms = 0.0, max_ms = 0.0;
-  // What is not tracking's own time; NaN where that was not measured.
+  // Latency without tracking's own time; NaN if that was not measured.
   double beyond_tracking_p50_ms = 0.0, beyond_tracking_p99_ms = 0.0;
   double frame_period_ms = 0.0;         // median
   std::int64_t later_than_a_frame = 0;  // frames whose latency is longer than a frame period
@@ -35,9 +35,9 @@ struct SteadinessMetrics {
 
 // Thread CPU time of tracking, of those frames where it was measured alone.
 [[nodiscard]] std::vector<double> tracking_times_ms(std::span<const TimedFrame> frames);
-// Nothing in lockstep.
+// Empty in lockstep.
 [[nodiscard]] std::optional<LatencyMetrics> measure_latency(const std::vector<TimedFrame>& frames);
-// Nothing under 400 frames: a twentieth then has no 99th percentile to speak of.
+// Empty under 400 frames: a twentieth is then too short for a 99th percentile.
 [[nodiscard]] std::optional<SteadinessMetrics> measure_steadiness(const std::vector<TimedFrame>& frames);
 
 [[nodiscard]] Json to_json(const LatencyMetrics& metrics);

@@ -45,7 +45,7 @@ wait_until() {
 }
 
 says() { grep -q -- "$1" $daemon_log; }
-# How many lines say so.
+# The number of such lines.
 said() { grep -c -- "$1" $daemon_log; }
 said_times() { [ "$(said "$1")" -ge "$2" ]; }
 

@@ -1,5 +1,5 @@
-// A recording of a public data set, as its importer found it: who saw what when. Image bytes stay in their
-// files until they are copied into the log.
+// A recording of a public data set: its sensors, and their samples in order of time. Image bytes stay in
+// their files until they are copied into the log.
 #pragma once
 
 #include <cstdint>
@@ -48,8 +48,8 @@ struct RecordingTruth {
 };
 
 struct Recording {
-  // What T_body_camera and the truth refer to; empty where the data set names no body. The body then stands
-  // at camera 0 with axes x forward, y left, z up.
+  // The body of T_body_camera and of the truth; empty if the data set names none. The body then stands at
+  // camera 0 with axes x forward, y left, z up.
   std::string body_name;
   std::vector<RecordingCamera> cameras;
   std::optional<ImuCalibration> imu_calibration;
@@ -63,17 +63,16 @@ struct Recording {
 // Rotation of a camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
 [[nodiscard]] slam::SE3 forward_looking_T_body_camera();
 
-// Format and size from the head of an image file's bytes. Throws InputError naming `file`.
+// Reads format and size from the header of an image file. Throws InputError naming `file`.
 [[nodiscard]] ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file);
 
-// Sets parameters.width/height from the first image of each camera where they are 0, checks each camera, and
-// fills a rate that is unknown from the median interval of the images. Throws InputError; `calibration` is
-// the file to blame.
+// Sets parameters.width/height of 0 from the first image of each camera, checks each camera, and fills an
+// unknown rate by the median interval of the images. Throws InputError naming the file `calibration`.
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording);
 
-// Keeps `frames` instants of the images (0: all that follow) from the one numbered `first` on, and the IMU
-// samples and truth of their time, half a second more on either side. Throws InputError naming
-// `recording_name` where there is no such instant.
+// Keeps `frames` instants of the images (0: all that follow) from number `first` on, and IMU samples and
+// truth of that time and half a second on either side. Throws InputError naming `recording_name` without such
+// an instant.
 void keep_part(std::int64_t first, std::int64_t frames, const std::string& recording_name,
                Recording* recording);
 

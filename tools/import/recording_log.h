@@ -1,5 +1,4 @@
-// A Recording as an LCM log: CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in the order of their
-// times.
+// Writes a Recording as an LCM log: CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in order of time.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +8,8 @@
 
 namespace farpoint::tools {
 
-// Copies the image files' bytes as they are. The file appears whole or not at all and replaces an existing
-// one. Throws InputError for an image that cannot be read or has another size than its camera, RunError where
-// the log cannot be written.
+// Copies the image files' bytes unchanged. Replaces an existing log atomically. Throws InputError for an
+// image that cannot be read or differs in size from its camera, RunError if the log cannot be written.
 void write_recording(const Recording& recording, const std::filesystem::path& log_file);
 
 }  // namespace farpoint::tools

@@ -10,7 +10,7 @@
 namespace farpoint::tools::report {
 namespace {
 
-// Depths of points less certain than this say nothing (METHOD.md).
+// Depths of points less certain than this are left out.
 constexpr float kMaxRelativeSigma = 0.30F;
 
 std::vector<double> creation_depths(const RunRecord& run) {

@@ -1,5 +1,5 @@
-// A diagram with two labelled axes. Lines are told apart by dash and thickness as well as by colour, so that
-// they can be told in grey.
+// A diagram with two labelled axes. Lines differ in dash and thickness as well as in colour, so that they
+// stay distinct in grey.
 #pragma once
 
 #include <Eigen/Core>
@@ -46,7 +46,7 @@ class Plot {
   // A vertical line across the whole diagram.
   void mark_x(const std::string& name, double x, const Style& style);
 
-  // Empty where nothing was drawn.
+  // Empty if nothing was drawn.
   [[nodiscard]] std::string svg() const;
 
  private:

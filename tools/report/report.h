@@ -12,7 +12,7 @@ struct ReportRequest {
   std::filesystem::path truth;              // the recording, or a TUM file; may be empty
 };
 
-// Throws InputError for what cannot be read.
+// Throws InputError for a file that cannot be read.
 [[nodiscard]] std::string make_report(const ReportRequest& request);
 
 }  // namespace farpoint::tools::report

@@ -1,4 +1,4 @@
-// What a report reads of one run: everything that its output log says, in time.
+// Content of one run's output log for a report, in order of time.
 #pragma once
 
 #include <filesystem>
@@ -38,7 +38,7 @@ struct RunRecord {
   [[nodiscard]] std::string length_unit() const;
 };
 
-// Throws InputError where the file is no output log of farpointd.
+// Throws InputError unless the file is an output log of farpointd.
 [[nodiscard]] RunRecord read_run_record(const std::filesystem::path& file, const Truth* truth);
 
 }  // namespace farpoint::tools::report

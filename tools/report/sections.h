@@ -1,4 +1,4 @@
-// The parts of a report, each as HTML; empty where the runs say nothing about it.
+// The parts of a report, each as HTML; empty without data in the runs.
 #pragma once
 
 #include <filesystem>
@@ -11,16 +11,16 @@ namespace farpoint::tools::report {
 
 using Runs = std::vector<RunRecord>;
 
-// One row a run: what evaluation says.
+// One row of evaluation a run.
 [[nodiscard]] std::string overview_section(const Runs& runs);
 // Top view, height, and error over the way; `truth` may be null.
 [[nodiscard]] std::string trajectory_section(const Runs& runs, const Truth* truth);
 [[nodiscard]] std::string timing_section(const Runs& runs);
 // Features, matches, track lengths and times side by side, with ratios to the first run.
 [[nodiscard]] std::string workload_section(const Runs& runs);
-// Distances at which points were made and seen; against a simulated world, how right they are.
+// Distances at which points were made and seen, and on a simulated world their errors.
 [[nodiscard]] std::string landmark_section(const Runs& runs);
-// How long virtual map points lived before they became points, and when.
+// Life times of virtual map points before they became points.
 [[nodiscard]] std::string vmp_section(const Runs& runs);
 [[nodiscard]] std::string map_section(const Runs& runs);
 // Tracks drawn over frames of the recording, which has the images; empty without one.

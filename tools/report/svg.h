@@ -31,11 +31,11 @@ class Svg {
   // Many small squares as one path element.
   void dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::string_view attributes);
   void jpeg(const std::vector<std::uint8_t>& bytes, double width_px, double height_px);
-  // What is added in between is cut off outside the rectangle.
+  // Clips what is added between the two calls at the rectangle.
   void begin_clip(const Eigen::Vector2d& corner, const Eigen::Vector2d& size);
   void end_clip();
 
-  // The whole element; `title` is what a screen reader says.
+  // The whole element; `title` is the text for screen readers.
   [[nodiscard]] std::string finish(std::string_view title) const;
 
  private:

@@ -1,7 +1,7 @@
-// A simulated recording: a world, the vehicle's motion through it, and what its sensors say at any time.
+// A simulated recording: a world, the vehicle's motion through it, and its sensors' measurements at any time.
 //
-// The same object answers for the truth later: made again from a log's SIMULATION message it gives the true
-// distance along any pixel of any frame.
+// Made again from a log's SIMULATION message, the same object gives the true distance along any pixel of any
+// frame.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace farpoint::tools::simulate {
 
-// Raised whenever the same request makes other bytes.
+// Raised whenever the bytes of the same request change.
 constexpr int kSimulatorVersion = 1;
 
 struct SimulationRequest {
@@ -38,9 +38,9 @@ struct SimulatedImage {
 
 class Simulation {
  public:
-  // Throws InputError for a request that is wrong.
+  // Throws InputError for an invalid request.
   explicit Simulation(const SimulationRequest& request);
-  // The simulation that a log comes from. Throws InputError where another version made it.
+  // Returns the simulation of a log. Throws InputError for a log of another version.
   [[nodiscard]] static SimulationRequest request_of(const simulation_t& message);
   [[nodiscard]] simulation_t message() const;
 
@@ -59,10 +59,10 @@ class Simulation {
   [[nodiscard]] double frame_time_s(std::int64_t frame) const;
   [[nodiscard]] double row_time_s() const { return description_.camera.row_time_s; }
 
-  // Images have to be taken in order, camera 0 first: exposure and noise follow from what came before.
+  // Images must be taken in order, camera 0 first, since exposure and noise depend on earlier ones.
   void take_image(std::int64_t frame, int camera, SimulatedImage* image);
 
-  // Truth: what pixels of a frame look at. In any order.
+  // Truth: the surfaces along pixels of a frame. In any order.
   [[nodiscard]] std::vector<SeenPoint> look(std::int64_t frame, int camera,
                                             const std::vector<Eigen::Vector2d>& pixels);
 

@@ -1,5 +1,5 @@
-// How lcm-spy is started with Farpoint's types. Debian's own script starts no Java after 11: it names a
-// garbage collector that is gone.
+// Command line of lcm-spy with Farpoint's types. Debian's own script fails with Java after 11, since it
+// selects a removed garbage collector.
 #pragma once
 
 #include <filesystem>
@@ -8,21 +8,22 @@
 
 namespace farpoint::tools {
 
-// What a machine has; an empty path is what was not found.
+// Files found on the machine; an empty path was not found.
 struct SpyParts {
   std::filesystem::path java;
   std::filesystem::path types_jar;     // Farpoint's, made by the build
   std::filesystem::path lcm_jar;       // lcm-spy itself
-  std::filesystem::path jchart2d_jar;  // what it draws with
+  std::filesystem::path jchart2d_jar;  // its plotting library
   bool has_display = false;
 };
 
-// Looks where they are: java by JAVA_HOME and PATH, Farpoint's jar in share/farpoint beside the folder of
-// `program`, the others in `jar_folders`.
+// Searches java by JAVA_HOME and PATH, Farpoint's jar in share/farpoint beside the folder of `program`, the
+// others in `jar_folders`.
 [[nodiscard]] SpyParts find_spy_parts(const std::filesystem::path& program,
                                       const std::vector<std::filesystem::path>& jar_folders);
 
-// Program and arguments. Throws RunError naming the first part that is missing and what would bring it.
+// Returns program and arguments. Throws RunError naming the first missing part and the command that installs
+// it.
 [[nodiscard]] std::vector<std::string> spy_command_line(const SpyParts& parts, const std::string& url);
 
 }  // namespace farpoint::tools

@@ -1,5 +1,5 @@
-// What `farpoint top` shows: the newest messages of a running farpointd, and what follows from several of
-// them.
+// The picture of `farpoint top`: the newest messages of a running farpointd, and rates and latencies over
+// several of them.
 #pragma once
 
 #include <cstdint>
@@ -13,18 +13,18 @@ namespace farpoint::tools {
 
 class Board {
  public:
-  // now_s: when it arrived, any clock that does not jump.
+  // now_s: time of arrival, by any clock that does not jump.
   void take(const odometry_t& message, double now_s);
   void take(const status_t& message, double now_s);
   void take(const timing_t& message, double now_s);
-  // A message that could not be decoded: another version of the types.
+  // Counts an undecodable message: another version of the types.
   void take_undecodable() { ++undecodable_; }
 
   // The whole picture, lines of at most 100 characters. colour: with the terminal's codes.
   [[nodiscard]] std::string render(double now_s, bool colour) const;
 
  private:
-  static constexpr double kWindow_s = 5.0;  // rates and latencies are of so long
+  static constexpr double kWindow_s = 5.0;  // window of rates and latencies
   struct Times {
     double arrived_s = 0, latency_ms = 0, tracking_ms = 0;
   };

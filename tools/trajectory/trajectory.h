@@ -11,8 +11,8 @@
 
 namespace farpoint::tools {
 
-// One pose at one time. time_s is a double as in the text form: the pairing of an estimate with truth must
-// come out as it does for any other program that reads the same files.
+// One pose at one time. time_s is a double as in the text form, so that pairing an estimate with truth gives
+// the same result as in other programs that read the same files.
 struct TimedPose {
   double time_s = 0.0;
   slam::SE3 pose;           // T_world_body (truth) or T_map_body (estimate)

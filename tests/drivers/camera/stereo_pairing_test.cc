@@ -101,7 +101,7 @@ TEST(StereoPairing, MoreImagesThanItHoldsGoOnBeforeTheirPatienceEnds) {
 }
 
 // Two cameras with jitter and latencies of their own that lose images: nothing is lost, doubled, paired
-// wrongly or out of order, and whoever has a partner gets it.
+// wrongly or out of order, and each image with a partner is paired.
 TEST(StereoPairing, WhateverTheCamerasLoseAllElseFindsItsPartner) {
   struct Arrival {
     std::int64_t at_us;

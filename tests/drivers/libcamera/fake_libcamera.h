@@ -13,7 +13,7 @@ class FakeLibcamera final : public FakeCamera {
   [[nodiscard]] std::unique_ptr<drivers::CameraDevice> make_device(drivers::CameraOptions options) override;
   void give_exposure_and_gain() override;
   [[nodiscard]] bool show(const FakeShot& shot) override;
-  void unplug() override;  // it says so
+  void unplug() override;  // reported by its signal
   void fail_stream() override;
   [[nodiscard]] bool is_readable(int fd) const override;
 

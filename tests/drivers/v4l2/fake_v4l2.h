@@ -20,7 +20,7 @@ class FakeV4l2 final : public FakeCamera {
   [[nodiscard]] std::unique_ptr<drivers::CameraDevice> make_device(drivers::CameraOptions options) override;
   void give_exposure_and_gain() override;
   [[nodiscard]] bool show(const FakeShot& shot) override;
-  void unplug() override;  // it says so by errors
+  void unplug() override;  // reported by errors
   void fail_stream() override { stream_error_ = EIO; }
   [[nodiscard]] bool is_readable(int fd) const override;
 

@@ -22,7 +22,7 @@ struct FakeOutput {
   int format_errno = 0, buffers_errno = 0, start_errno = 0;
   bool keeps_its_size = false;  // S_FMT is answered well, and changes nothing
   std::uint32_t stride_padding = 0, most_buffers = 8;
-  int held = 0;  // it keeps so many buffers to itself when they are asked back
+  int held = 0;                                   // buffers that it keeps when they are requested
   std::size_t unplugged_after = ~std::size_t{0};  // images
 
   // What it was given.

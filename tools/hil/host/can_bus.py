@@ -1,4 +1,4 @@
-"""A receiver of the daemon's CAN frames that knows the DBC alone: not a line of the sender's code."""
+"""A receiver of the daemon's CAN frames that uses the DBC alone, without a line of the sender's code."""
 
 import dataclasses
 import pathlib

@@ -231,7 +231,7 @@ def schedule(folder, stock, log, output, least):
 
 
 def bus(folder, stock, log, of, rate_hz, *expectations):
-    """What a receiver that knows only the DBC makes of a bus."""
+    """Decodes a bus by the DBC alone."""
     text = (stock.here.parents[1] / "config/farpoint.dbc").read_text()
     clocks, frames = played(folder / of)
     receiver = can_bus.Receiver(can_bus.layout(text))

@@ -37,7 +37,8 @@ class Scenario:
 
 def read(path):
     lines = path.read_text().splitlines()
-    one = Scenario(path.stem, lines[0].lstrip("# "), path.read_text())
+    title = next(line for line in lines if "SPDX-License-Identifier" not in line)
+    one = Scenario(path.stem, title.lstrip("# "), path.read_text())
     for line in lines:
         if not line.startswith("#@ "):
             continue

@@ -1,4 +1,4 @@
-# Odometry at 50 Hz on vcan from images at 10 Hz, read by a receiver that knows only the DBC: rate, counter, CRC, age.
+# Odometry at 50 Hz on vcan from images at 10 Hz, decoded by the DBC alone: rate, counter, CRC, age.
 #@ form: short
 #@ check: bus can.log played 50 valid
 #@ broken: one epoch is taken out of what the receiver gets

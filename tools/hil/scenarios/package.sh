@@ -1,4 +1,4 @@
-# The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all but the last.
+# The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all except the last.
 #@ form: long
 #@ machine: systemd
 #@ needs: package

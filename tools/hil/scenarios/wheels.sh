@@ -7,7 +7,7 @@
 loopback
 modprobe -a vcan can-raw && ip link add vcan0 type vcan && ip link set up vcan0 || fail "no vcan"
 vehicle_dbc ${BROKEN:+0.02}
-# Every 50 ms both axles, from backwards to forwards, and a frame that nobody asked for.
+# Every 50 ms both axles, from backwards to forwards, and a frame that is not read.
 for n in {0..79}; do
   speed=$((60 * n - 1500))
   at=$((n / 20)).$(printf %06d $((n % 20 * 50000)))

@@ -1,4 +1,4 @@
-// Images that are rendered before they are due, a small bounded number of frames ahead.
+// Renders images before they are due, a small bounded number of frames ahead.
 #pragma once
 
 #include <chrono>
@@ -18,13 +18,13 @@ namespace farpoint::tools::simulate {
 // One image a camera.
 using FrameImages = std::vector<image_t>;
 
-// Where frames come from, in order.
+// Source of frames, in order.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  // Whether all that can be prepared is. Waits for some tenths of a second at most.
+  // Returns true when all frames that fit are prepared. Waits some tenths of a second at most.
   [[nodiscard]] virtual bool is_ahead() = 0;
-  // The next frame; false where it is not there yet, after some tenths of a second at most.
+  // Takes the next frame; false if it is not ready within some tenths of a second.
   [[nodiscard]] virtual bool next(FrameImages* images) = 0;
 };
 
@@ -37,7 +37,7 @@ class FramesAhead final : public FrameSource {
   FramesAhead(const FramesAhead&) = delete;
   FramesAhead& operator=(const FramesAhead&) = delete;
 
-  // Both throw what rendering threw, once the frames before were taken.
+  // Both rethrow an error of rendering after the frames before it were taken.
   [[nodiscard]] bool is_ahead() override;
   [[nodiscard]] bool next(FrameImages* images) override;
 

@@ -1,5 +1,5 @@
-// Where each pixel of a camera looks: rays, and the cells of the perspective views that the scene is drawn
-// into. Lens distortion is thereby exact in the textures, and good to a fraction of a pixel in the outlines.
+// Rays of each pixel of a camera, and the cells of the perspective views that the scene is drawn into. Lens
+// distortion is thereby exact in the textures, and good to a fraction of a pixel in the outlines.
 #pragma once
 
 #include <Eigen/Core>

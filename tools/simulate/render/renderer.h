@@ -1,5 +1,5 @@
-// Draws a scene as a camera sees it over one exposure: a software rasteriser that finds the visible face of
-// each pixel, and then shades exact rays of the real lens model on that face.
+// Draws a scene over one exposure of a camera. A software rasteriser finds the visible face of each pixel,
+// then shades exact rays of the real lens model on that face.
 //
 // Anti-aliasing and motion blur come from several passes a frame, each at another place within the pixels and
 // at another time of the exposure; their mean is the image. Between the passes the mip level is dithered, so
@@ -32,11 +32,11 @@ struct RendererOptions {
   double blur_px = 1.2;  // width over which the passes of one pixel are spread: the lens
 };
 
-// What lies along the ray of a pixel.
+// The surface along the ray of a pixel.
 struct SeenPoint {
   double distance_m = 0.0;  // along the ray, from the camera's centre; infinite for sky and clouds
   bool is_moving = false;   // on a moving object
-  // The same for the pixel's neighbourhood: at outlines they differ.
+  // The same for the pixel's neighbourhood; they differ at outlines.
   double nearest_m = 0.0, farthest_m = 0.0;
 };
 
@@ -50,7 +50,7 @@ class Renderer {
   // Radiance of each pixel, row by row, before lens fall-off and sensor; valid until the next call.
   const std::vector<float>& render(const Scene& scene, const CameraPath& path, const Shutter& shutter);
 
-  // Truth: what the given pixels look at in the middle of their exposure. `radius_px` sizes the
+  // Truth: the surfaces along the given pixels' rays in the middle of their exposure. `radius_px` sizes the
   // neighbourhood.
   [[nodiscard]] std::vector<SeenPoint> look(const Scene& scene, const CameraPath& path,
                                             const Shutter& shutter,

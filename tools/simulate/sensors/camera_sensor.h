@@ -1,4 +1,4 @@
-// From light to grey values: automatic exposure, lens fall-off, shot and read noise, tone curve.
+// Converts light to grey values: automatic exposure, lens fall-off, shot and read noise, tone curve.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ class CameraSensor {
 
   // For the next frame, at a time.
   [[nodiscard]] Exposure exposure_at(double time_s) const;
-  // Radiance of each pixel (1: white in full sun) into grey values. Then looks at the result to set the next
-  // exposure, as cameras do.
+  // Converts the radiance of each pixel (1: white in full sun) to grey values. Then sets the next exposure by
+  // the result, as cameras do.
   void expose(const std::vector<float>& radiance, const Exposure& exposure, double time_s,
               double frame_interval_s, std::uint8_t* grey);
 

@@ -1,4 +1,4 @@
-// What the sensors of a simulation say, as messages whose times begin at 0 with the simulation.
+// Measurements of a simulation's sensors as messages. Times begin at 0 with the simulation.
 #pragma once
 
 #include <cstdint>
@@ -18,10 +18,10 @@ namespace farpoint::tools::simulate {
 
 [[nodiscard]] calibration_t calibration_of(const Simulation& simulation);
 [[nodiscard]] ground_truth_t truth_of(const Simulation& simulation, std::int64_t frame);
-// The image that take_image() gave, grey.
+// The grey image of take_image().
 [[nodiscard]] image_t grey_message(const Simulation& simulation, std::int64_t frame, int camera,
                                    const SimulatedImage& image);
-// Length of the way that was gone until then.
+// Length of the way up to that time.
 [[nodiscard]] double path_length_m(const BodyPath& body, double duration_s);
 
 struct MotionSample {
@@ -29,11 +29,11 @@ struct MotionSample {
   std::variant<imu_t, wheels_t> message;
 };
 
-// IMU and wheels, in the order of their times. Reads nothing of the simulation that taking images changes.
+// IMU and wheels in order of time. Independent of the state that taking images changes.
 class MotionMeasurements {
  public:
   explicit MotionMeasurements(const Simulation& simulation);
-  // The next sample, unless it is later than `until_s`.
+  // Returns the next sample up to `until_s`.
   [[nodiscard]] std::optional<MotionSample> next(double until_s);
 
  private:

@@ -1,4 +1,4 @@
-// What an IMU and wheel encoders make of the true motion.
+// IMU and wheel encoders: measurements of the true motion.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct InertialTruth {
 class ImuSensor {
  public:
   ImuSensor(const ImuDescription& description, std::uint64_t seed);
-  // Samples have to be taken in order: the biases walk.
+  // Samples must be taken in order, since the biases walk.
   [[nodiscard]] imu_t sample(const BodyPath& body, double time_s);
 
  private:

@@ -35,7 +35,7 @@ class BodyPath {
 
  private:
   static constexpr double kKnot_s = 0.05;
-  // The splines begin so long before time 0: exposures and interpolation reach back.
+  // Time before 0 at which the splines begin, since exposures and interpolation reach back.
   static constexpr double kLead_s = 1.0;
   using Knot = Eigen::Matrix<double, 6, 1>;  // x y z yaw pitch roll
 

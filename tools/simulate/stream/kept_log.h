@@ -1,4 +1,4 @@
-// What a run that ends early leaves of its log.
+// The log of a run that ends early.
 #pragma once
 
 #include <string>
@@ -7,8 +7,7 @@
 
 namespace farpoint::tools::simulate {
 
-// Keeps what there is as <file>.incomplete, and says so to go on in an error's message; empty where nothing
-// is kept.
+// Keeps the log as <file>.incomplete, and returns a text for an error's message; empty if nothing is kept.
 [[nodiscard]] inline std::string keep_incomplete(ipc::LogWriter* log) {
   const std::string kept = log->keep_incomplete();
   return kept.empty() ? "" : "; the log so far is kept as " + kept;

@@ -99,7 +99,7 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::string& file) {
   }
 }
 
-// Keeps what there is and says so.
+// Keeps the incomplete log and throws with its name.
 [[noreturn]] void give_up(const std::string& why, std::int64_t frames, const RecorderOptions& options,
                           ipc::LogWriter* log) {
   throw RunError(options.output + ": " + why + " after " + std::to_string(frames) + " frames" +

@@ -1,5 +1,5 @@
-// A simulation as an LCM log: CALIBRATION and SIMULATION first, then IMU, WHEELS, GROUND_TRUTH and CAMERA_N
-// in the order of their times.
+// Writes a simulation as an LCM log: CALIBRATION and SIMULATION first, then IMU, WHEELS, GROUND_TRUTH and
+// CAMERA_N in order of time.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ struct RecorderResult {
   double path_m = 0.0, simulated_s = 0.0, cpu_s = 0.0;
 };
 
-// Throws InputError where the output cannot be opened, RunError where it could not be written to its end or a
-// signal stopped it; what was written so far is then kept as <output>.incomplete, and replays.
+// Throws InputError if the output cannot be opened, RunError after a failed write or a signal. The part
+// written so far is then kept as <output>.incomplete, and replays.
 RecorderResult record(Simulation* simulation, const RecorderOptions& options);
 
 }  // namespace farpoint::tools::simulate

@@ -3,8 +3,8 @@
 
 namespace farpoint::tools::simulate {
 
-// While it lives, SIGINT and SIGTERM are noted; a reader that goes away (SIGPIPE) or a file size limit
-// (SIGXFSZ) becomes an error of the write.
+// During its life SIGINT and SIGTERM are recorded, and a closed reader (SIGPIPE) or a file size limit
+// (SIGXFSZ) becomes a write error.
 class StopSignals {
  public:
   StopSignals();
@@ -12,7 +12,7 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  // The signal that asked to stop; 0: none.
+  // The received stop signal; 0: none.
   [[nodiscard]] static int received();
 
  private:

@@ -13,10 +13,10 @@ namespace {
 constexpr std::int64_t kSecond_us = 1'000'000;
 // From when all is ready to the first image.
 constexpr std::int64_t kLead_us = 100'000;
-// So often a stop is looked for while nothing is due.
+// Interval of the check for a stop while nothing is due.
 constexpr std::int64_t kSlice_us = 100'000;
-// A device that holds all of its buffers is asked again so soon, and given up after so many periods of the
-// images, a second at least: it may give them back at their rate.
+// Interval of tries while the device holds all of its buffers, and the number of image periods (a second at
+// least) after which it is given up: it may return buffers at the images' rate.
 constexpr std::int64_t kRetry_us = 1000;
 constexpr double kPatience_periods = 3.0;
 

@@ -1,9 +1,8 @@
-// A simulation in real time: what its sensors say goes out when it is due.
+// Streams a simulation in real time: each measurement goes out at its due time.
 //
-// Moment t of the simulation is due at start + t / pace, of CLOCK_MONOTONIC. That time, not the one at which
-// something did go out, is the stamp of an image and the utime of a message. Images are rendered ahead; where
-// the renderer does not keep the pace all the same, everything goes out in its order as soon as it can, and
-// late.
+// Moment t of the simulation is due at start + t / pace, of CLOCK_MONOTONIC. The due time, not the time of
+// sending, is the stamp of an image and the utime of a message. Images are rendered ahead. If the renderer
+// does not keep the pace, measurements go out late, in order, as soon as possible.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +30,7 @@ class MonotonicClock final : public PaceClock {
   void sleep_until(std::int64_t due_us) override;  // or a signal
 };
 
-// An image that went out later after its time is called late: more than a busy, but not overloaded, machine
-// does.
+// An image is late above this delay, which a busy machine reaches only under overload.
 constexpr std::int64_t kLate_us = 2000;
 
 struct StreamOptions {
@@ -50,7 +48,7 @@ struct StreamResult {
 
 using StreamSinks = std::vector<std::unique_ptr<StreamSink>>;
 
-// Streams all frames of the simulation, or until it is to stop. What the sinks throw ends it.
+// Streams all frames of the simulation, or until a stop. An exception of a sink ends it.
 StreamResult stream(const Simulation& simulation, FrameSource* frames, const StreamSinks& sinks,
                     PaceClock* clock, const StreamOptions& options);
 

@@ -1,4 +1,4 @@
-// Where a simulation streams to. Messages carry the times at which they were due, of CLOCK_MONOTONIC.
+// Sinks of a streamed simulation. Messages carry their due times, of CLOCK_MONOTONIC.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@
 
 namespace farpoint::tools::simulate {
 
-// Each takes what it has a use for. They throw RunError where the stream cannot go on.
+// Each sink uses the messages that concern it. They throw RunError if the stream cannot continue.
 class StreamSink {
  public:
   virtual ~StreamSink() = default;
@@ -29,16 +29,16 @@ class StreamSink {
   virtual void take_imu(const imu_t&) {}
   virtual void take_wheels(const wheels_t&) {}
   virtual void take_truth(const ground_truth_t&) {}
-  // False where it cannot be taken just now: it is offered again.
+  // Returns false if the image cannot be accepted now; it is offered again.
   [[nodiscard]] virtual bool take_image(const image_t&) { return true; }
   // About once a second.
   virtual void maintain() {}
-  // All was sent.
+  // Called after the last message.
   virtual void close() {}
-  // The stream ended by an error: what is to be said of what is left behind, to go on in its message.
+  // Called after an error: returns a text on the kept log for the error's message.
   [[nodiscard]] virtual std::string abandon() { return {}; }
   [[nodiscard]] virtual std::string name() const = 0;
-  // What did not get through, for the last line; empty: nothing.
+  // Text on unsent data for the last line; empty: none.
   [[nodiscard]] virtual std::string losses() const { return {}; }
 };
 
@@ -57,7 +57,7 @@ class VideoSink final : public StreamSink {
 };
 #endif
 
-// Everything but images, which are not for UDP.
+// Everything except images, which do not go over UDP.
 class LcmSink final : public StreamSink {
  public:
   explicit LcmSink(const std::string& url) : publisher_(url) {}
@@ -87,11 +87,10 @@ class CanSink final : public StreamSink {
   std::unique_ptr<drivers::SocketCan> bus_;
 };
 
-// Everything that is streamed, images too. Without SIMULATION: the world cannot be asked by the clock's
-// times.
+// All streamed data, images included. Without SIMULATION, since its times are not the clock's.
 class LogSink final : public StreamSink {
  public:
-  // Throws InputError where it cannot be opened.
+  // Throws InputError if it cannot be opened.
   explicit LogSink(std::string file);
   ~LogSink() override;  // without close(): what there is is kept as <file>.incomplete
   LogSink(const LogSink&) = delete;

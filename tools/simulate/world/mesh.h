@@ -1,4 +1,4 @@
-// What the simulated world is made of: flat textured faces, gathered in clusters (one building, one tree) and
+// Geometry of the simulated world: flat textured faces, gathered in clusters (one building, one tree) and
 // chunks (one square of the world).
 #pragma once
 

@@ -1,4 +1,4 @@
-// Centre lines of roads in the plane, and how far places are from them.
+// Centre lines of roads in the plane, and distances from them.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,14 +20,14 @@ class Path {
 
   Path() = default;
   // Straight lines between the corners, which are rounded by arcs of at most `radius_m` (less where the lines
-  // are too short), then smoothed a little, as nobody steers in steps. Precondition: two corners or more,
+  // are too short), then smoothed a little, since steering is continuous. Precondition: two corners or more,
   // three for a closed path, each more than a metre from the next.
   Path(const std::vector<Eigen::Vector2d>& corners, double radius_m, bool closed);
 
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] bool closed() const { return closed_; }
   [[nodiscard]] bool empty() const { return points_.empty(); }
-  // Beyond its ends an open path goes straight on; a closed one goes round again.
+  // An open path continues straight beyond its ends; a closed one repeats.
   [[nodiscard]] Place at(double s_m) const;
 
  private:
@@ -40,12 +40,12 @@ class Path {
   bool closed_ = false;
 };
 
-// Finds the nearest of many points of roads. Not thread-safe: it remembers.
+// Finds the nearest of many points of roads. Not thread-safe: it caches distances.
 class RoadFinder {
  public:
   static constexpr double kMaxDistance_m = 3000.0;
   void add(const Path& path, double half_width_m);
-  // Metres from the nearest road's edge, negative on it; kMaxDistance_m where there is none nearer.
+  // Metres from the nearest road's edge, negative on it; kMaxDistance_m beyond that distance.
   [[nodiscard]] double distance_m(double x, double y) const;
 
  private:

@@ -1,4 +1,4 @@
-// Things that stand about: trees, houses, cars, lamps, signs. Each becomes clusters of a mesh; places are in
+// Props: trees, houses, cars, lamps, signs. Each becomes clusters of a mesh; places are in
 // the mesh's own axes, on the ground.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What the renderer draws at one time: the chunks near the camera, what moves, light, air and sky.
+// Input of the renderer at one time: chunks near the camera, moving objects, light, air and sky.
 #pragma once
 
 #include <Eigen/Core>

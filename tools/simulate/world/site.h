@@ -1,4 +1,4 @@
-// What the builders of the world's parts share, and the builders. Each adds what lies within one chunk; a
+// The builders of the world's parts, and their common data. Each adds what lies within one chunk; a
 // part belongs to the chunk that holds its middle, and looks the same whichever chunks are built and when.
 #pragma once
 
@@ -30,7 +30,7 @@ struct Site {
 
 constexpr double kStreetHalfWidth_m = 4.0;
 
-// Where a chunk stands, and what gets its faces.
+// Position of a chunk, and the mesh that receives its faces.
 struct ChunkSite {
   Eigen::Vector3d origin;
   double size_m;

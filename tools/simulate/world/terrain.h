@@ -1,4 +1,4 @@
-// Height of the ground, and what grows on it, as functions of the place.
+// Height and cover of the ground as functions of the place.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// A world made from its description and a seed: where things are at any time. Ground, houses and trees are
-// made around the camera as it moves, in chunks.
+// A world made from its description and a seed, at any time. Makes ground, houses and trees in chunks around
+// the moving camera.
 #pragma once
 
 #include <map>
@@ -26,8 +26,8 @@ class World {
   // Where the vehicle drives: the road's or the streets' centre line, or the way around the yard.
   [[nodiscard]] const Path& route() const { return route_; }
 
-  // What can be seen from a place. Makes and drops chunks; valid until the next call. What moves has to be
-  // set by the caller.
+  // Returns the visible scene at a place; valid until the next call. Makes and drops chunks. The caller sets
+  // moving objects.
   [[nodiscard]] Scene scene_around(const Eigen::Vector3d& position);
 
  private:

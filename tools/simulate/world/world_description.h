@@ -1,4 +1,4 @@
-// What a world file says (config/worlds/*.yaml): plain values with units. README.md in that folder explains
+// Content of a world file (config/worlds/*.yaml): plain values with units. README.md in that folder explains
 // each key.
 #pragma once
 

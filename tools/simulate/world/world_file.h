@@ -1,5 +1,4 @@
-// World files (config/worlds/*.yaml), read strictly: every complaint names file, line, key and what was
-// expected.
+// Strict world files (config/worlds/*.yaml): every error names file, line, key and what was expected.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +8,11 @@
 
 namespace farpoint::tools::simulate {
 
-// The file that WORLD means: a path, or a name of config/worlds beside the program's source or installation.
-// Throws InputError where there is none.
+// Returns the file of WORLD: a path, or a name of config/worlds beside the program's source or installation.
+// Throws InputError without such a file.
 [[nodiscard]] std::filesystem::path find_world(const std::string& path_or_name);
 
-// Throws InputError. `text` is the file's content and `file` its name in complaints; the world's name is the
+// Throws InputError. `text` is the file's content and `file` its name in errors; the world's name is the
 // file's stem.
 [[nodiscard]] WorldDescription parse_world(const std::string& text, const std::filesystem::path& file);
 

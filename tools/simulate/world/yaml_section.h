@@ -1,4 +1,4 @@
-// One map of a YAML file, read key by key with bounds; what was never asked for is unknown and refused.
+// One map of a YAML file, read key by key with bounds. A key that no call has read is refused.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -17,12 +17,12 @@ class YamlSection {
   // `name` is the dotted way to the map, empty at the top.
   YamlSection(YAML::Node node, const std::filesystem::path& file, std::string name);
 
-  // Each leaves *value as it is where the key is absent; bounds are inclusive. All throw InputError.
+  // Each leaves *value unchanged for an absent key; bounds are inclusive. All throw InputError.
   void number(const std::string& key, double low, double high, const std::string& unit, double* value);
   void integer(const std::string& key, int low, int high, int* value);
   void flag(const std::string& key, bool* value);
   void degrees(const std::string& key, double low_deg, double high_deg, double* value_rad);
-  // One of the words; gives its index.
+  // Reads one of the words and gives its index.
   void word(const std::string& key, const std::vector<std::string>& words, int* index);
   void text(const std::string& key, std::string* value);
   // A list of numbers, or of lists of `columns` numbers. Empty where the key is absent.
@@ -33,7 +33,7 @@ class YamlSection {
 
   [[nodiscard]] bool has(const std::string& key) const;
   void require(const std::string& key) const;
-  // Fails where the map has a key that none of the calls above named.
+  // Fails for a key that no call above has read.
   void finish() const;
   // Throws InputError at the line of a key (or of the map itself where it is absent).
   [[noreturn]] void fail(const std::string& key, const std::string& message) const;
