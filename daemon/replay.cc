@@ -71,6 +71,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
   LogFrameSource source(options.replay, config.camera.index);
   Outputs outputs(options, config);
   std::unique_ptr<Session> session;
+  std::optional<MeasurementFeed> feed;
   std::vector<double> cpu_ms;  // of decoding and tracking, a frame
   std::int64_t frames_dropped = 0;
   Progress progress;
@@ -79,6 +80,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
   while (StopOnSignal::signal() == 0 && source.next(&frame, &clock)) {
     if (!session) {
       session = session_of(config, source, &outputs, schedule ? "recorded" : "lockstep", schedule != nullptr);
+      source.feed_to(&feed.emplace(&session->estimator()));
     }
     const RecordedChance* recorded = nullptr;
     if (schedule != nullptr && (recorded = schedule->take(frame.utime)) == nullptr) {
@@ -107,6 +109,8 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   SourceFrame first;
   if (!source.next(&first, &clock)) throw InputError(source.name() + ": no image");
   const std::unique_ptr<Session> session = session_of(config, source, &outputs, "threaded", true);
+  MeasurementFeed feed(&session->estimator());
+  source.feed_to(&feed);
   PacedSource paced(&source, first, *options.speed);
   RealtimeReport realtime(config.realtime);
   realtime.lock_memory();

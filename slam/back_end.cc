@@ -4,23 +4,23 @@
 
 namespace farpoint::slam {
 
-MappingSide::MappingSide(const EstimatorConfig& config, const Rig& rig, Exchange* exchange)
-    : config_(config), exchange_(*exchange), mapper_(config, rig), poser_(config) {}
+BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
+    : config_(config), rings_(*rings), mapper_(config, rig), poser_(config) {}
 
-void MappingSide::collect_recorded() {
-  while (const RecordedFrame* frame = exchange_.recorded.front()) {
+void BackEnd::collect_recorded() {
+  while (const RecordedFrame* frame = rings_.recorded.front()) {
     if (config_.capacity.whole_trajectory) recorded_.emplace_back(*frame);
-    exchange_.recorded.pop();
+    rings_.recorded.pop();
   }
 }
 
-bool MappingSide::step() {
-  MappingJob* job = exchange_.jobs.front();
+bool BackEnd::step() {
+  MappingJob* job = rings_.jobs.front();
   if (job == nullptr) return false;
   const StageSpan span(listener_, Stage::kMapping);
   collect_recorded();
   // There is room: a job has two replies at most, and tracking sends no more jobs than have room for theirs.
-  reply_ = exchange_.replies.begin_push();
+  reply_ = rings_.replies.begin_push();
   reply_->number = ++replies_;
   reply_->job_number = job->number;
   reply_->frame_number = job->frame_number;
@@ -54,27 +54,21 @@ bool MappingSide::step() {
   return true;
 }
 
-void MappingSide::hand_over() {
+void BackEnd::hand_over() {
   if (reply_->ends_job) {
-    // The slot must not keep frames and views from their pools.
-    MappingJob& job = *exchange_.jobs.front();
-    job.pair.first.reset();
-    job.pair.second.reset();
-    job.keyframe.frame.reset();
-    job.frames.clear();
-    job.view.reset();
-    exchange_.jobs.pop();
+    rings_.jobs.front()->clear();
+    rings_.jobs.pop();
   }
-  exchange_.replies.end_push();
+  rings_.replies.end_push();
 }
 
-void MappingSide::discard_map(std::int32_t map_id) {
+void BackEnd::discard_map(std::int32_t map_id) {
   std::erase_if(recorded_, [&](const KeptFrame& r) { return r.map_id == map_id; });
   mapper_.discard_map(map_id);
 }
 
-bool MappingSide::pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
-                             std::vector<RecordedFrame>* posed) {
+bool BackEnd::pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
+                         std::vector<RecordedFrame>* posed) {
   const TrackOutcome o = poser_.track_from(frame, *prior);
   if (!o.ok || o.inliers < config_.tracking.min_inliers) return false;
   *prior = o.T_world_body;
@@ -85,7 +79,7 @@ bool MappingSide::pose_frame(const MappingJob& job, const Frame& frame, SE3* pri
 
 // Frames from before the map: backwards from the pair that began it, and forwards those that came while the
 // map was being made.
-void MappingSide::pose_frames(const MappingJob& job) {
+void BackEnd::pose_frames(const MappingJob& job) {
   const auto first = std::find_if(recorded_.begin(), recorded_.end(),
                                   [&](const KeptFrame& r) { return r.map_id == job.map_id; });
   SE3 T_world_first;

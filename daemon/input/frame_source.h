@@ -8,7 +8,7 @@
 #include "daemon/system/stage_clock.h"
 #include "ipc/image_codec.h"
 #include "ipc/message.h"
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
 
 namespace farpoint::daemon {
 

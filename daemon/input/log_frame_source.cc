@@ -44,6 +44,7 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   while (source_.next(&item)) {
     offset_ = item.offset;
     if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
+    feed(item);
     if (item.kind != drivers::LogItemKind::kImage || item.camera != camera_index_) continue;
     if (!calibration_) {
       ++before_calibration_;
@@ -62,6 +63,12 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   }
   if (!gave_image_) refuse_empty();
   return false;
+}
+
+void LogFrameSource::feed(const drivers::LogItem& item) {
+  if (feed_ == nullptr) return;
+  if (item.kind == drivers::LogItemKind::kImu) feed_->add(*item.imu);
+  if (item.kind == drivers::LogItemKind::kWheels) feed_->add(*item.wheels);
 }
 
 void LogFrameSource::take_calibration(const calibration_t& calibration) {
@@ -104,6 +111,9 @@ InputCounts LogFrameSource::counts() const {
   counts.unknown_camera = as_signed(c.images_unknown_camera) + before_calibration_;
   counts.times_backwards = as_signed(c.times_backwards);
   counts.messages_undecodable = as_signed(c.messages_undecodable);
+  counts.imu_invalid = as_signed(c.imu_invalid);
+  counts.wheels_invalid =
+      as_signed(c.wheels_invalid) + (feed_ != nullptr ? feed_->wheels_without_value() : 0);
   counts.log_damages = as_signed(source_.damage().places);
   return counts;
 }

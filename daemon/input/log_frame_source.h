@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/input/frame_source.h"
+#include "daemon/input/measurement_feed.h"
 #include "drivers/log/log_source.h"
 
 namespace farpoint::daemon {
@@ -18,6 +19,9 @@ class LogFrameSource final : public FrameSource {
   // Throws InputError at the end of a log without any accepted image. The line names the cause: no
   // calibration, no such camera, nothing decodable.
   [[nodiscard]] bool next(SourceFrame* frame, StageClock* clock) override;
+  // After the first image. From now on next() feeds the IMU and WHEELS messages that it reads on its way to
+  // an image. Earlier ones are passed over: no frame precedes them. `feed` outlives its use.
+  void feed_to(MeasurementFeed* feed) { feed_ = feed; }
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
@@ -33,6 +37,7 @@ class LogFrameSource final : public FrameSource {
 
  private:
   void take_calibration(const calibration_t& calibration);
+  void feed(const drivers::LogItem& item);
   [[noreturn]] void refuse_empty() const;
 
   std::string name_;
@@ -42,6 +47,7 @@ class LogFrameSource final : public FrameSource {
   int calibrations_ignored_ = 0;
   std::int64_t before_calibration_ = 0, wrong_size_decoded_ = 0;
   bool gave_image_ = false;
+  MeasurementFeed* feed_ = nullptr;
   ipc::GreyImage image_;
   double file_bytes_ = -1.0;
   std::uint64_t offset_ = 0;

@@ -5,7 +5,7 @@
 
 #include "daemon/input/counts.h"
 #include "daemon/system/stage_clock.h"
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
 
 namespace farpoint::daemon {
 

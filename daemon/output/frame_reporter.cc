@@ -49,7 +49,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     for (PoseSink* sink : sinks_) sink->on_frame(frame_);
     publisher_->on_frame(frame_);
     publish_status(*package, out);
-    maps_->publish_known(result.replies_taken, publisher_);
+    maps_->publish_known(result.taken.replies, publisher_);
     if (with_schedule_) publish_schedule(*package);
   }
   note_state(frame_.result);
@@ -113,7 +113,7 @@ void FrameReporter::publish_schedule(const FramePackage& package) {
   schedule_t m{};
   m.utime = r.utime;
   m.sequence = r.sequence;
-  m.replies_taken = static_cast<std::int64_t>(r.replies_taken);
+  m.replies_taken = static_cast<std::int64_t>(r.taken.replies);
   m.view_sequence = static_cast<std::int64_t>(r.view_sequence);
   m.job = static_cast<std::int64_t>(r.job);
   m.frames_dropped = package.chance.frames_dropped;
@@ -121,6 +121,9 @@ void FrameReporter::publish_schedule(const FramePackage& package) {
   m.capture_queue = package.chance.capture_queue;
   m.publish_queue = package.chance.publish_queue;
   m.features_asked = package.chance.features_asked;
+  m.imu_taken = static_cast<std::int64_t>(r.taken.imu);
+  m.wheels_taken = static_cast<std::int64_t>(r.taken.wheels);
+  m.samples_dropped = static_cast<std::int64_t>(package.counts.imu.dropped + package.counts.wheels.dropped);
   publisher_->publish(ipc::kScheduleChannel, r.utime, m);
 }
 
@@ -151,6 +154,14 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.times_backwards = in.times_backwards;
   s.messages_undecodable = in.messages_undecodable;
   s.log_damages = in.log_damages;
+  s.imu_invalid = in.imu_invalid;
+  s.imu_used = static_cast<std::int64_t>(counts.imu.used);
+  s.imu_late = static_cast<std::int64_t>(counts.imu.late);
+  s.imu_dropped = static_cast<std::int64_t>(counts.imu.dropped);
+  s.wheels_used = static_cast<std::int64_t>(counts.wheels.used);
+  s.wheels_late = static_cast<std::int64_t>(counts.wheels.late);
+  s.wheels_dropped = static_cast<std::int64_t>(counts.wheels.dropped);
+  s.wheels_invalid = in.wheels_invalid;
   s.can_send_errors = out.can_send_errors;
   s.can_bus_offs = out.can_bus_offs;
   s.can_received = out.can_received;
@@ -160,8 +171,8 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.maps = static_cast<std::int32_t>(counts.maps);
   s.keyframes = static_cast<std::int32_t>(counts.keyframes);
   s.landmarks = static_cast<std::int32_t>(counts.landmarks);
-  s.vmps = static_cast<std::int32_t>(counts.vmps);
-  s.message = counts.calibration_contradicted ? kCalibrationContradicted : std::string_view{};
+  s.vmps = static_cast<std::int32_t>(counts.mapping.vmp_alive);
+  s.message = counts.mapping.calibration_contradicted ? kCalibrationContradicted : std::string_view{};
   s.times_lost = static_cast<std::int64_t>(counts.lost);
   s.capture_queue = chance.capture_queue;
   s.mapping_queue = r.jobs_under_way;

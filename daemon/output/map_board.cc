@@ -12,7 +12,7 @@ MapBoard::MapBoard(const Config& config)
       next_utime_(kAtOnce),
       sheets_(kSheets) {}
 
-void MapBoard::note(const slam::Estimator& estimator, const slam::MappingNote& note) {
+void MapBoard::note(const slam::Inspection& inspection, const slam::MappingNote& note) {
   if (!note.full || !due(note.utime, rate_hz_, &next_utime_)) return;
   Sheet* sheet = sheets_.begin_push();
   if (sheet == nullptr) return;  // the output is far behind: this map is skipped
@@ -21,7 +21,7 @@ void MapBoard::note(const slam::Estimator& estimator, const slam::MappingNote& n
   result.map_id = note.map_id;
   const FrameOutput frame = make_frame_output(result, assumed_scale_);
   const double unit_scale = frame.result.scale == slam::ScaleState::kAssumed ? assumed_scale_ : 1.0;
-  const MapContent content{estimator.landmarks(), estimator.keyframe_poses()};
+  const MapContent content{inspection.landmarks(), inspection.keyframe_poses()};
   ipc::encode(make_map(frame, content, points_, unit_scale), &sheet->bytes);
   sheet->reply = note.reply;
   sheet->utime = note.utime;

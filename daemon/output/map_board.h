@@ -6,7 +6,8 @@
 
 #include "daemon/config/config.h"
 #include "daemon/output/publisher.h"
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
+#include "slam/inspection.h"
 #include "slam/spsc_ring.h"
 
 namespace farpoint::daemon {
@@ -19,7 +20,7 @@ class MapBoard {
   explicit MapBoard(const Config& config);
 
   // Mapping's thread.
-  void note(const slam::Estimator& estimator, const slam::MappingNote& note);
+  void note(const slam::Inspection& inspection, const slam::MappingNote& note);
   // The output's thread.
   void publish_known(std::uint64_t replies_taken, Publisher* publisher);
 

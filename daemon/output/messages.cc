@@ -76,25 +76,26 @@ map_summary_t make_map_summary(const RunEnd& end, std::size_t index) {
 }
 
 void set_counts(const slam::EstimatorCounts& counts, summary_t* s) {
+  const slam::MappingCounts& mapping = counts.mapping;
   const auto signed_count = [](std::uint64_t n) { return static_cast<std::int64_t>(n); };
   s->frames_rejected = signed_count(counts.frames_rejected);
-  s->keyframes_made = signed_count(counts.keyframes_made);
-  s->keyframes_culled = signed_count(counts.keyframes_culled);
+  s->keyframes_made = signed_count(mapping.keyframes_made);
+  s->keyframes_culled = signed_count(mapping.keyframes_culled);
   s->maps_made = signed_count(counts.maps);
   s->times_lost = signed_count(counts.lost);
-  s->landmarks_made = signed_count(counts.landmarks_made);
-  s->landmarks_culled = signed_count(counts.landmarks_culled);
-  s->landmarks_fused = signed_count(counts.landmarks_fused);
-  s->vmp_made = signed_count(counts.vmp_made);
-  s->vmp_attached = signed_count(counts.vmp_attached);
-  s->vmp_merged = signed_count(counts.vmp_merged);
-  s->vmp_promoted = signed_count(counts.vmp_promoted);
-  s->vmp_rejected = signed_count(counts.vmp_rejected);
-  s->vmp_evicted = signed_count(counts.vmp_evicted);
-  s->local_ba = signed_count(counts.local_ba);
+  s->landmarks_made = signed_count(mapping.landmarks_made);
+  s->landmarks_culled = signed_count(mapping.landmarks_culled);
+  s->landmarks_fused = signed_count(mapping.landmarks_fused);
+  s->vmp_made = signed_count(mapping.vmp_made);
+  s->vmp_attached = signed_count(mapping.vmp_attached);
+  s->vmp_merged = signed_count(mapping.vmp_merged);
+  s->vmp_promoted = signed_count(mapping.vmp_promoted);
+  s->vmp_rejected = signed_count(mapping.vmp_rejected);
+  s->vmp_evicted = signed_count(mapping.vmp_evicted);
+  s->local_ba = signed_count(mapping.local_ba);
   s->keyframes = static_cast<std::int32_t>(counts.keyframes);
   s->landmarks = static_cast<std::int32_t>(counts.landmarks);
-  s->vmps = static_cast<std::int32_t>(counts.vmps);
+  s->vmps = static_cast<std::int32_t>(mapping.vmp_alive);
 }
 
 }  // namespace

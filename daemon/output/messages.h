@@ -11,6 +11,7 @@
 #include "daemon/config/config.h"
 #include "daemon/output/pose_sink.h"
 #include "ipc/message.h"
+#include "slam/inspection.h"
 
 namespace farpoint::daemon {
 

@@ -1,7 +1,7 @@
 // Where a frame's outcome goes: one interface, whether it is a network, a bus or a file.
 #pragma once
 
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
 
 namespace farpoint::daemon {
 

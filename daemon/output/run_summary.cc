@@ -51,13 +51,13 @@ std::string refused_text(const InputCounts& in, std::int64_t frames_dropped) {
 
 // What a map of fixed size lost, where anything was.
 std::string forgotten_text(const slam::EstimatorCounts& counts) {
-  if (counts.keyframes_forgotten == 0) return "";
-  return fmt::format("; the full map forgot {} keyframes and {} landmarks", counts.keyframes_forgotten,
-                     counts.landmarks_forgotten);
+  if (counts.mapping.keyframes_forgotten == 0) return "";
+  return fmt::format("; the full map forgot {} keyframes and {} landmarks",
+                     counts.mapping.keyframes_forgotten, counts.mapping.landmarks_forgotten);
 }
 
 const char* calibration_text(const RunEnd& end) {
-  return end.counts.calibration_contradicted ? "; the images contradict the calibration" : "";
+  return end.counts.mapping.calibration_contradicted ? "; the images contradict the calibration" : "";
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 #include "daemon/output/pose_sink.h"
 #include "ipc/output_file.h"
-#include "slam/estimator.h"
+#include "slam/inspection.h"
 
 namespace farpoint::daemon {
 

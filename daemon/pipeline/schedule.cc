@@ -19,9 +19,16 @@ Schedule::Schedule(const std::string& log) : log_(log) {
       if (event.channel != ipc::kScheduleChannel || !ipc::decode(event.data, &m)) continue;
       const FrameChance chance{m.frames_dropped, m.age_us, m.capture_queue, m.publish_queue,
                                m.features_asked};
-      entries_.push_back({m.utime,
-                          static_cast<std::uint64_t>(m.job),
-                          {chance, static_cast<std::uint64_t>(m.replies_taken)}});
+      const slam::FrameTaken taken{static_cast<std::uint64_t>(m.replies_taken),
+                                   static_cast<std::uint64_t>(m.imu_taken),
+                                   static_cast<std::uint64_t>(m.wheels_taken)};
+      if (m.samples_dropped > 0) {
+        throw InputError(fmt::format(
+            "{}: the recorded run dropped {} sensor samples until {:.6f} s and cannot be repeated, "
+            "expected a run that dropped none",
+            log, m.samples_dropped, 1e-6 * static_cast<double>(m.utime)));
+      }
+      entries_.push_back({m.utime, static_cast<std::uint64_t>(m.job), {chance, taken}});
     }
   } catch (const std::runtime_error& error) {
     throw InputError(error.what());
@@ -45,12 +52,19 @@ const RecordedChance* Schedule::take(std::int64_t utime) {
 
 void Schedule::check(const slam::FrameResult& result) const {
   const Entry& entry = entries_[next_ - 1];
-  if (result.replies_taken == entry.recorded.replies_taken && result.job == entry.job) return;
-  throw InputError(
-      fmt::format("{}: the frame at {:.6f} s knew {} results of mapping and gave job {}, now {} "
-                  "and {}; expected the configuration and the build of the recorded run",
-                  log_, 1e-6 * static_cast<double>(entry.utime), entry.recorded.replies_taken, entry.job,
-                  result.replies_taken, result.job));
+  const slam::FrameTaken &then = entry.recorded.taken, &now = result.taken;
+  if (now.imu != then.imu || now.wheels != then.wheels) {
+    throw InputError(fmt::format(
+        "{}: the frame at {:.6f} s had taken {} IMU and {} wheel samples, now {} and {}; expected the log of "
+        "the "
+        "recorded run",
+        log_, 1e-6 * static_cast<double>(entry.utime), then.imu, then.wheels, now.imu, now.wheels));
+  }
+  if (now.replies == then.replies && result.job == entry.job) return;
+  throw InputError(fmt::format(
+      "{}: the frame at {:.6f} s knew {} results of mapping and gave job {}, now {} "
+      "and {}; expected the configuration and the build of the recorded run",
+      log_, 1e-6 * static_cast<double>(entry.utime), then.replies, entry.job, now.replies, result.job));
 }
 
 void Schedule::check_end() const {

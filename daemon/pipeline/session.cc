@@ -60,7 +60,7 @@ Session::Session(const Config& config, const slam::Rig& rig, std::string calibra
   reporter_ = std::make_unique<FrameReporter>(config, names_, std::move(sinks), publisher, &maps_,
                                               static_cast<std::int64_t>(pool_bytes_), with_schedule);
   if (publisher->has_sinks())
-    estimator_.on_view([this](const slam::MappingNote& note) { maps_.note(estimator_, note); });
+    estimator_.on_view([this](const slam::MappingNote& note) { maps_.note(estimator_.inspect(), note); });
 }
 
 const FrameOutput& Session::process(const slam::FrameInput& input, const InputCounts& in,
@@ -94,19 +94,20 @@ void Session::remember(const slam::FrameResult& published, bool valid, bool with
 
 const slam::FrameResult& Session::process_recorded(slam::FrameInput input, const RecordedChance& recorded) {
   input.most_features = recorded.chance.features_asked;
-  return estimator_.process_recorded(input, recorded.replies_taken);
+  return estimator_.process_recorded(input, recorded.taken);
 }
 
 const RunEnd& Session::finish(const InputCounts& in) {
   estimator_.finish();
   estimator_.release_frames();
-  if (config_.estimator.calibration.refine) print_calibration(estimator_.calibration());
+  if (config_.estimator.calibration.refine) print_calibration(estimator_.inspect().calibration());
   end_.counts = estimator_.counts();
-  end_.trajectories = estimator_.trajectories();
-  end_.landmarks = estimator_.landmarks();
+  const slam::Inspection maps = estimator_.inspect();
+  end_.trajectories = maps.trajectories();
+  end_.landmarks = maps.landmarks();
   end_.unit_scale = end_.last.scale == slam::ScaleState::kAssumed ? config_.scale.assumed : 1.0;
   end_.observation_distances.assign(end_.trajectories.size(), {});
-  estimator_.visit_observation_distances([&](std::int32_t map_id, double distance) {
+  maps.visit_observation_distances([&](std::int32_t map_id, double distance) {
     for (std::size_t i = 0; i < end_.trajectories.size(); ++i) {
       if (end_.trajectories[i].map_id == map_id) end_.observation_distances[i].push_back(distance);
     }
@@ -132,7 +133,7 @@ void Session::publish_results(const InputCounts& in) {
 
 void Session::publish_landmarks() {
   const std::span<const slam::LandmarkInfo> all(end_.landmarks);
-  const auto sightings = [this](const slam::LandmarkInfo& l) { return estimator_.sightings(l); };
+  const auto sightings = [this](const slam::LandmarkInfo& l) { return estimator_.inspect().sightings(l); };
   for (std::size_t first = 0; first < all.size(); first += kLandmarksAMessage) {
     const std::size_t count = std::min(kLandmarksAMessage, all.size() - first);
     publisher_->publish_result(ipc::kLandmarksChannel, end_.utime,

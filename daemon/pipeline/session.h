@@ -13,6 +13,7 @@
 #include "daemon/input/counts.h"
 #include "daemon/output/frame_reporter.h"
 #include "daemon/output/messages.h"
+#include "slam/estimator.h"
 
 namespace farpoint::daemon {
 
@@ -21,7 +22,7 @@ class Outputs;
 // One frame of a threaded run, to be repeated.
 struct RecordedChance {
   FrameChance chance;
-  std::uint64_t replies_taken = 0;
+  slam::FrameTaken taken;
 };
 
 class Session {

@@ -78,7 +78,7 @@ TEST(EndlessLong, TwentyThousandFramesTakeNoMoreMemoryAndTime) {
   EXPECT_EQ(estimator.counts().lost, 0U);
   EXPECT_EQ(estimator.counts().maps, 1U);
   EXPECT_GT(valid, 0.98 * static_cast<double>(kFrames));
-  EXPECT_GT(estimator.counts().keyframes_made, 10 * estimator.counts().keyframes);  // it forgot
+  EXPECT_GT(estimator.counts().mapping.keyframes_made, 10 * estimator.counts().keyframes);  // it forgot
 }
 
 }  // namespace

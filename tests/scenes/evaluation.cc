@@ -55,22 +55,25 @@ double local_scale(const Paths& p, std::size_t i, double fallback) {
 }
 
 void compare_landmarks(const slam::Estimator& estimator, const slam::MapTrajectory& main, const Paths& paths,
-                       const slam::Rig& rig, Simulator* simulator, RunReport* report) {
+                       double rate_hz, const slam::Rig& rig, const ShownPoints& shown, Simulator* simulator,
+                       RunReport* report) {
   std::vector<double> scale_at(paths.frames.size(), 0.0);
-  for (const slam::LandmarkInfo& l : estimator.landmarks()) {
+  for (const slam::LandmarkInfo& l : estimator.inspect().landmarks()) {
     if (l.map_id != main.map_id || !l.full) continue;
-    if (tag_point(l.tag) >= kNothing) {
+    const std::uint32_t point = shown.find(l.anchor_utime, l.anchor_pixel);
+    if (point >= kNothing) {
       ++report->phantoms;
       continue;
     }
     if (l.creation_relative_sigma < 0.3)
       report->creation_depths_m.push_back(l.creation_depth * report->scale);
-    const std::uint32_t frame = tag_frame(l.tag);
+    const auto frame =
+        static_cast<std::uint32_t>(std::llround(1e-6 * static_cast<double>(l.anchor_utime) * rate_hz));
     const auto at = std::lower_bound(paths.frames.begin(), paths.frames.end(), frame);
     if (at == paths.frames.end() || *at != frame || !(l.inverse_depth_sigma > 0.0)) continue;
     const auto i = static_cast<std::size_t>(at - paths.frames.begin());
     const Vector3d anchor = (simulator->truth(frame) * rig.cameras.front().T_body_camera).t;
-    const double depth_m = (simulator->position(tag_point(l.tag)) - anchor).norm();
+    const double depth_m = (simulator->position(point) - anchor).norm();
     if (scale_at[i] <= 0.0) scale_at[i] = local_scale(paths, i, report->scale);
     LandmarkError e;
     e.true_depth_m = depth_m;
@@ -107,15 +110,16 @@ double RunReport::creation_share_beyond(double depth_m) const {
 }
 
 double RunReport::vmp_share() const {
-  return counts.landmarks_made == 0
-             ? 0.0
-             : static_cast<double>(counts.vmp_promoted) / static_cast<double>(counts.landmarks_made);
+  return counts.mapping.landmarks_made == 0 ? 0.0
+                                            : static_cast<double>(counts.mapping.vmp_promoted) /
+                                                  static_cast<double>(counts.mapping.landmarks_made);
 }
 
 RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::EstimatorConfig& config,
                     const FrameHook& hook) {
   RunReport report;
   Simulator simulator(scene, seed);
+  ShownPoints shown;
   slam::Estimator estimator(config, scene.believed_rig());
   struct Live {
     std::int32_t map_id;
@@ -127,6 +131,7 @@ RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::Estimato
   for (int i = 0; i < scene.frames; ++i) {
     double start = cpu_seconds();
     Sighted s = simulator.next();
+    shown.note(s);
     report.simulator_seconds += cpu_seconds() - start;
     report.most_world_points = std::max(report.most_world_points, simulator.points_in_memory());
     if (i > 0) report.path_m += (s.T_world_body.t - before).norm();
@@ -147,7 +152,7 @@ RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::Estimato
   }
   estimator.finish();
   report.counts = estimator.counts();
-  report.trajectories = estimator.trajectories();
+  report.trajectories = estimator.inspect().trajectories();
   if (report.trajectories.empty()) return report;
 
   const slam::MapTrajectory& main = report.trajectories.front();
@@ -170,11 +175,11 @@ RunReport run_scene(const Scene& scene, std::uint64_t seed, const slam::Estimato
     report.scale_along.push_back(local_scale(paths, i, report.scale) / report.scale);
   }
   std::vector<double> distances;
-  estimator.visit_observation_distances([&](std::int32_t map_id, double d) {
+  estimator.inspect().visit_observation_distances([&](std::int32_t map_id, double d) {
     if (map_id == main.map_id) distances.push_back(d * report.scale);
   });
   report.median_observation_m = quantile(distances, 0.5);
-  compare_landmarks(estimator, main, paths, scene.rig(), &simulator, &report);
+  compare_landmarks(estimator, main, paths, scene.rate_hz, scene.rig(), shown, &simulator, &report);
   return report;
 }
 

@@ -118,17 +118,19 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
                   EXPECT_EQ(virtual_points, c.vmps) << "frame " << frame;
                 });
   EXPECT_GT(compared, 5);
-  EXPECT_GT(r.counts.vmp_made, 300U);
-  EXPECT_GT(r.counts.vmp_attached, 300U);
-  EXPECT_GT(r.counts.vmp_merged, 0U);
-  EXPECT_GT(r.counts.vmp_promoted, 100U);
-  EXPECT_GT(r.counts.vmp_rejected, 0U);
-  EXPECT_GT(r.counts.vmp_evicted, 0U);
-  EXPECT_GE(r.counts.landmarks_made, r.counts.vmp_promoted);
+  EXPECT_GT(r.counts.mapping.vmp_made, 300U);
+  EXPECT_GT(r.counts.mapping.vmp_attached, 300U);
+  EXPECT_GT(r.counts.mapping.vmp_merged, 0U);
+  EXPECT_GT(r.counts.mapping.vmp_promoted, 100U);
+  EXPECT_GT(r.counts.mapping.vmp_rejected, 0U);
+  EXPECT_GT(r.counts.mapping.vmp_evicted, 0U);
+  EXPECT_GE(r.counts.mapping.landmarks_made, r.counts.mapping.vmp_promoted);
 
   const RunReport baseline = run_mode(shortened("straight", 60), 3, LandmarkMode::kBaseline);
-  EXPECT_EQ(baseline.counts.vmp_made + baseline.counts.vmp_attached + baseline.counts.vmp_promoted, 0U);
-  EXPECT_GT(baseline.counts.landmarks_made, 300U);
+  EXPECT_EQ(baseline.counts.mapping.vmp_made + baseline.counts.mapping.vmp_attached +
+                baseline.counts.mapping.vmp_promoted,
+            0U);
+  EXPECT_GT(baseline.counts.mapping.landmarks_made, 300U);
 }
 
 // -----------------------------------------------------------------------------------------------------------
@@ -165,10 +167,10 @@ TEST(Forgetting, SmallMapsGoOnForEver) {
         if (frame > 100) most_images = std::max(most_images, SimImage::alive());
       });
   EXPECT_GE(r.most_keyframes, 23U);  // it was full
-  EXPECT_GT(r.counts.keyframes_made, 40U);
-  EXPECT_GT(r.counts.keyframes_forgotten, 10U);
-  EXPECT_GT(r.counts.landmarks_forgotten, 500U);
-  EXPECT_LE(r.counts.keyframes_forgotten, r.counts.keyframes_culled);
+  EXPECT_GT(r.counts.mapping.keyframes_made, 40U);
+  EXPECT_GT(r.counts.mapping.keyframes_forgotten, 10U);
+  EXPECT_GT(r.counts.mapping.landmarks_forgotten, 500U);
+  EXPECT_LE(r.counts.mapping.keyframes_forgotten, r.counts.mapping.keyframes_culled);
   EXPECT_EQ(r.counts.lost, 0U);
   EXPECT_EQ(r.counts.maps, 1U);
   EXPECT_GT(r.posed_frames, 0.98 * scene.frames);

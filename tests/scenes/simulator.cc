@@ -21,7 +21,6 @@ constexpr int kCell_px = 60;
 std::atomic<int> images_alive{0};
 
 static_assert(sizeof(PatchPayload) <= sizeof(slam::Patch::pixels));
-static_assert(offsetof(PatchPayload, point) == 0 && offsetof(PatchPayload, frame) == 4);
 
 }  // namespace
 
@@ -118,6 +117,23 @@ slam::Alignment SimImage::align(const slam::Patch& host, const Eigen::Matrix2f& 
 
 // ---------------------------------------------------------------------------------------------------------
 // simulator
+
+void ShownPoints::note(const Sighted& sighted) {
+  std::vector<Feature>& features = frames_[sighted.input.utime];
+  for (std::size_t i = 0; i < sighted.points.size(); ++i) {
+    const slam::Feature& f = sighted.input.features.features[i];
+    features.push_back({{f.u_px, f.v_px}, sighted.points[i]});
+  }
+}
+
+std::uint32_t ShownPoints::find(std::int64_t utime, const Eigen::Vector2d& pixel) const {
+  const auto frame = frames_.find(utime);
+  if (frame == frames_.end()) return kNothing;
+  std::uint32_t found = kNothing;
+  for (const Feature& f : frame->second)
+    if (f.pixel.cast<double>() == pixel) found = std::min(found, f.point);
+  return found;
+}
 
 Simulator::Simulator(const Scene& scene, std::uint64_t seed)
     : scene_(scene),
@@ -272,6 +288,7 @@ Sighted Simulator::look(std::uint32_t frame, const SE3& T_world_body, double s_m
     set.descriptors.push_back(d);
     payloads.push_back({kNothing | i, frame, 0.0F, 0.0F, 0});
   }
+  for (const PatchPayload& p : payloads) out.points.push_back(p.point);
   out.input.utime = utime(frame);
   out.input.sequence = frame;
   out.input.image = std::make_shared<SimImage>(image_, frame, std::move(visible), std::move(payloads));

@@ -2,6 +2,7 @@
 // truth.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -11,7 +12,7 @@
 
 namespace farpoint::sim {
 
-// What a host patch carries instead of pixels. Its first eight bytes are LandmarkInfo.tag.
+// What a host patch carries instead of pixels.
 struct PatchPayload {
   std::uint32_t point = 0;     // id of the true point; kNothing and above: an outlier
   std::uint32_t frame = 0;     // in which the patch was cut: where the landmark is anchored
@@ -19,13 +20,6 @@ struct PatchPayload {
   std::uint32_t group = 0;
 };
 constexpr std::uint32_t kNothing = 0xE0000000U;
-
-[[nodiscard]] inline std::uint32_t tag_point(std::uint64_t tag) {
-  return static_cast<std::uint32_t>(tag);
-}
-[[nodiscard]] inline std::uint32_t tag_frame(std::uint64_t tag) {
-  return static_cast<std::uint32_t>(tag >> 32);
-}
 
 // The pixels behind a simulated frame: knows where every visible point projects, so that alignment measures
 // what real alignment would have measured.
@@ -70,8 +64,25 @@ class SimImage final : public slam::FrameImage {
 
 struct Sighted {
   slam::FeatureInput input;
+  std::vector<std::uint32_t> points;  // one a feature: id of the true point; kNothing and above: an outlier
   slam::SE3 T_world_body;
   double travelled_m = 0;
+};
+
+// Which true point each feature of the frames so far shows.
+class ShownPoints {
+ public:
+  void note(const Sighted& sighted);
+  // Of the feature at this pixel of this frame; kNothing where there is none. A point goes before an outlier
+  // at the same pixel.
+  [[nodiscard]] std::uint32_t find(std::int64_t utime, const Eigen::Vector2d& pixel) const;
+
+ private:
+  struct Feature {
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+    std::uint32_t point = kNothing;
+  };
+  std::map<std::int64_t, std::vector<Feature>> frames_;
 };
 
 class Simulator {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
 
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
 #include "tools/report/html.h"
 #include "tools/report/plot.h"
 #include "tools/report/sections.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "slam/estimator.h"
+#include "slam/frame_result.h"
 
 namespace farpoint::tools {
 namespace {

@@ -31,7 +31,7 @@ schedule_t message(std::int64_t utime, std::int64_t replies, std::int64_t job) {
 
 slam::FrameResult result(std::uint64_t replies, std::uint64_t job) {
   slam::FrameResult r;
-  r.replies_taken = replies;
+  r.taken.replies = replies;
   r.job = job;
   return r;
 }
@@ -42,7 +42,7 @@ TEST(Schedule, GivesWhatEachFrameMetAndKnowsTheDropped) {
   Schedule schedule(scratch.path("s.lcm"));
   const RecordedChance* first = schedule.take(100);
   ASSERT_NE(first, nullptr);
-  EXPECT_EQ(first->replies_taken, 0U);
+  EXPECT_EQ(first->taken.replies, 0U);
   EXPECT_EQ(first->chance.frames_dropped, 3);
   EXPECT_EQ(first->chance.age_us, 4000);
   EXPECT_EQ(first->chance.features_asked, 960);
@@ -68,6 +68,34 @@ TEST(Schedule, RefusesAnotherRecordingAnotherRunAndNothing) {
   EXPECT_THROW(Schedule(scratch.path("empty.lcm")), InputError);
   EXPECT_THROW(Schedule("/nonexistent.lcm"), InputError);
   EXPECT_THROW(Schedule("-"), InputError);
+}
+
+TEST(Schedule, GivesTheSamplesAFrameTookAndRefusesOtherNumbers) {
+  const test::Scratch scratch;
+  schedule_t m = message(100, 0, 0);
+  m.imu_taken = 40;
+  m.wheels_taken = 3;
+  write_schedule(scratch.path("s.lcm"), {m});
+  Schedule schedule(scratch.path("s.lcm"));
+  const RecordedChance* recorded = schedule.take(100);
+  ASSERT_NE(recorded, nullptr);
+  EXPECT_EQ(recorded->taken.imu, 40U);
+  EXPECT_EQ(recorded->taken.wheels, 3U);
+  slam::FrameResult r = result(0, 0);
+  r.taken = {0, 40, 3};
+  EXPECT_NO_THROW(schedule.check(r));
+  r.taken = {0, 39, 3};
+  EXPECT_THROW(schedule.check(r), InputError);
+  r.taken = {0, 40, 4};
+  EXPECT_THROW(schedule.check(r), InputError);
+}
+
+TEST(Schedule, RefusesARunThatDroppedSamples) {
+  const test::Scratch scratch;
+  schedule_t m = message(100, 0, 0);
+  m.samples_dropped = 1;
+  write_schedule(scratch.path("s.lcm"), {m});
+  EXPECT_THROW(Schedule(scratch.path("s.lcm")), InputError);
 }
 
 }  // namespace

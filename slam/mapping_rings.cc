@@ -1,4 +1,4 @@
-#include "slam/exchange.h"
+#include "slam/mapping_rings.h"
 
 #include "slam/tracking/initialiser.h"
 
@@ -6,11 +6,11 @@ namespace farpoint::slam {
 
 namespace {
 
-// A job with room for the largest of its kinds.
-MappingJob roomy_job(const EstimatorConfig& config) {
+// A job as large as any.
+MappingJob largest_job(const EstimatorConfig& config) {
   const auto features = static_cast<std::size_t>(config.extractor.features);
   MappingJob job;
-  // Touched, not only reserved: a page that is first used on the road is a page fault on the road.
+  // Touched, not only reserved: no page fault after the start.
   job.pair.points.resize(features);
   job.keyframe.sightings.resize(features);
   job.keyframe.counts.resize(static_cast<std::size_t>(config.capacity.landmarks));
@@ -19,15 +19,19 @@ MappingJob roomy_job(const EstimatorConfig& config) {
   return job;
 }
 
-void empty(MappingJob* job) {
-  job->pair.points.clear();
-  job->keyframe.sightings.clear();
-  job->keyframe.counts.clear();
-  job->frames.clear();
-  job->seen.clear();
-}
-
 }  // namespace
+
+void MappingJob::clear() {
+  pair.first.reset();
+  pair.second.reset();
+  pair.points.clear();
+  keyframe.frame.reset();
+  keyframe.sightings.clear();
+  keyframe.counts.clear();
+  frames.clear();
+  view.reset();
+  seen.clear();
+}
 
 KeptFrame::KeptFrame(const RecordedFrame& frame)
     : utime(frame.utime), map_id(frame.map_id), reference_id(static_cast<std::uint32_t>(frame.reference_id)) {
@@ -41,17 +45,17 @@ SE3 KeptFrame::T_reference_body() const {
   return {Eigen::Quaterniond(q).normalized(), Eigen::Map<const Eigen::Vector3f>(t_.data()).cast<double>()};
 }
 
-Exchange::Exchange(const EstimatorConfig& config)
-    : jobs(kJobs, roomy_job(config)), replies(kReplies), recorded(kRecords) {
-  // Copies of the roomy job have its sizes; clearing keeps the memory.
+MappingRings::MappingRings(const EstimatorConfig& config)
+    : jobs(kJobs, largest_job(config)), replies(kReplies), recorded(kRecords) {
+  // Copies of the largest job have its sizes; clear() keeps the memory.
   for (std::size_t i = 0; i < kJobs; ++i) {
-    empty(jobs.begin_push());
+    jobs.begin_push()->clear();
     jobs.end_push();
   }
   for (std::size_t i = 0; i < kJobs; ++i) jobs.pop();
 }
 
-std::size_t Exchange::bytes() const {
+std::size_t MappingRings::bytes() const {
   const MappingJob& job = jobs.sample();
   const std::size_t job_bytes = sizeof(MappingJob) + job.pair.points.capacity() * sizeof(InitialPoint) +
                                 job.keyframe.sightings.capacity() * sizeof(Sighting) +

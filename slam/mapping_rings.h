@@ -1,8 +1,8 @@
-// What goes between tracking and mapping, and the fixed rings it goes through. Nobody waits on either side.
+// Jobs from tracking to mapping, replies back, and the fixed rings between them. Neither side waits.
 //
-// Tracking sends jobs and, one a posed frame, where that frame stands. Mapping answers every job with one or
-// two replies, in order. What tracking does depends on the frames and on how many replies it has taken before
-// each of them, on nothing else of mapping: a list of these numbers is all that is needed to repeat a run.
+// Tracking sends jobs and, one a posed frame, that frame's pose. Mapping answers every job with one or two
+// replies, in order. A frame depends on mapping only through the number of replies taken before it, so that a
+// list of these numbers repeats a run.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ enum class MappingJobKind : std::uint8_t {
   kKeyframe,    // quick view, then full view
   kPoseFrames,  // frames from before the map; one reply without a view
   kDiscardMap,  // one reply without a view
-  kRetireMap,   // the same
+  kRetireMap,   // one reply without a view
 };
 
 struct MappingJob {
@@ -39,10 +39,13 @@ struct MappingJob {
   std::uint64_t last_before_map = 0;  // number of the second frame of the pair that began the map
   std::shared_ptr<const LocalView> view;
   std::vector<LandmarkHandle> seen;
+
+  // Gives frames and views back to their pools, and empties every list. Keeps the lists' memory.
+  void clear();
 };
 
 enum class MappingStage : std::uint8_t {
-  kStarted,  // the first view of a map, or none: it did not hold
+  kStarted,  // the first view of a map; null where the structure did not hold
   kQuick,    // new landmarks, poses not yet optimised
   kFull,     // after local BA
   kDone,     // no view: the job was of another kind, or the keyframe could not be used
@@ -60,8 +63,7 @@ struct MappingReply {
   std::uint32_t keyframes = 0, landmarks = 0;  // alive
 };
 
-// Where a frame was, relative to a keyframe, so that it follows the keyframe through every later
-// optimisation.
+// A frame's pose relative to a keyframe, so that it follows the keyframe through every later optimisation.
 struct RecordedFrame {
   std::int64_t utime = 0;
   std::int32_t map_id = 0;
@@ -69,7 +71,7 @@ struct RecordedFrame {
   SE3 T_reference_body;
 };
 
-// The same as it is kept to the end of a run, in half the room. Single precision turns it by up to 6e-8 rad
+// A recorded frame in half the room, kept to the end of a run. Single precision turns it by up to 6e-8 rad
 // and moves it by 6e-8 of its way from the keyframe: thousandths of any pose's sigma.
 class KeptFrame {
  public:
@@ -85,14 +87,14 @@ class KeptFrame {
   std::array<float, 3> t_;
 };
 
-struct Exchange {
-  // Jobs that may be under way at once. One keyframe at most, hence room for the rarer kinds.
+struct MappingRings {
+  // Jobs that may be under way at once: one keyframe at most, and room for the rarer kinds.
   static constexpr std::size_t kJobs = 4;
   static constexpr std::size_t kReplies = 2 * kJobs;
   // Frames tracked while mapping works on one job: far more than one job's time.
   static constexpr std::size_t kRecords = 1024;
 
-  explicit Exchange(const EstimatorConfig& config);
+  explicit MappingRings(const EstimatorConfig& config);
   [[nodiscard]] std::size_t bytes() const;
 
   SpscRing<MappingJob> jobs;         // tracking -> mapping

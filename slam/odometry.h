@@ -1,0 +1,34 @@
+// The frame `odom`: continuous, because it integrates relative motion only. Corrections of the map go into
+// map_from_odom, a new origin or unit raises the reset counter.
+#pragma once
+
+#include <cstdint>
+
+#include "slam/geometry/se3.h"
+
+namespace farpoint::slam {
+
+class Odometry {
+ public:
+  // The body moved to this pose of the map. Adds the motion since the pose before; none after interrupt().
+  void advance(const SE3& T_map_body);
+  // The map moved under the body: both arguments are one pose, before and after the correction. odom stays.
+  void correct(const SE3& T_map_body_before, const SE3& T_map_body_after);
+  // Frames were lost: the motion until the next pose is not added.
+  void interrupt() { has_last_ = false; }
+  // A new map has another origin and unit.
+  void begin_map() { ++resets_; }
+
+  [[nodiscard]] const SE3& T_odom_body() const { return T_odom_body_; }
+  // At this pose of the map. The scale is 1: odom has the map's unit.
+  [[nodiscard]] Sim3 map_from_odom(const SE3& T_map_body) const;
+  [[nodiscard]] std::uint32_t reset_counter() const { return resets_; }
+
+ private:
+  SE3 T_odom_body_;
+  SE3 T_map_body_last_;
+  bool has_last_ = false;
+  std::uint32_t resets_ = 0;
+};
+
+}  // namespace farpoint::slam

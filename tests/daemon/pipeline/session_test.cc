@@ -1,0 +1,84 @@
+#include "daemon/pipeline/session.h"
+
+#include "ipc/channels.h"
+#include "tests/daemon/pipeline/session_fixture.h"
+
+namespace farpoint::daemon {
+namespace {
+
+class SessionTest : public SessionFixture {
+ protected:
+  const FrameOutput& process(int number, const RecordedChance* recorded = nullptr) {
+    image_ = grey(number);
+    clock_.new_frame();
+    InputCounts in;
+    in.images = number + 1;
+    return session_->process(
+        {1'000'000 + number * 100'000, number, 0,
+         slam::ImageView{image_.data(), image_.width_px, image_.height_px, image_.width_px}},
+        in, {}, recorded, &clock_);
+  }
+
+  ipc::GreyImage image_;
+  StageClock clock_;
+};
+
+TEST_F(SessionTest, HandsEachFrameToTheSinksOnceAndInOrder) {
+  for (int i = 0; i < 6; ++i) process(i);
+  ASSERT_EQ(sink_.frames.size(), 6U);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(sink_.frames[static_cast<std::size_t>(i)].result.sequence, i);
+  EXPECT_EQ(kept_.of<odometry_t>(ipc::kOdometryChannel).size(), 6U);
+  EXPECT_GT(clock_.wall_ms(timing_t::STAGE_FRAME), 0.0);
+}
+
+TEST_F(SessionTest, TheEndCountsFramesAndKeepsTheTimesOfValidOnes) {
+  for (int i = 0; i < 3; ++i) process(i);
+  slam::FrameResult valid;
+  valid.utime = 5'000'000;
+  session_->remember(valid, true);
+  session_->remember(valid, true, false);
+  session_->remember(valid, false);
+  const RunEnd& end = session_->end();
+  EXPECT_EQ(end.frames, 6);
+  EXPECT_EQ(end.frames_valid, 2);
+  EXPECT_EQ(end.live_utimes, std::vector<std::int64_t>{5'000'000});
+  EXPECT_EQ(end.utime, 5'000'000);
+}
+
+TEST_F(SessionTest, FinishPublishesTheRunsResultsWithWhatWasRefused) {
+  for (int i = 0; i < 30; ++i) process(i);
+  InputCounts in;
+  in.times_backwards = 4, in.undecodable = 5;
+  const RunEnd& end = session_->finish(in);
+  EXPECT_EQ(end.counts.frames, 30U);
+  EXPECT_GT(end.counts.mapping.keyframes_made, 1U);
+  EXPECT_EQ(end.landmarks.size(), end.counts.landmarks);
+  EXPECT_EQ(kept_.of<trajectory_t>(ipc::kTrajectoryChannel).size(), 1U);
+  std::size_t published = 0;
+  for (const landmarks_t& m : kept_.of<landmarks_t>(ipc::kLandmarksChannel)) published += m.landmarks.size();
+  EXPECT_GT(published, 50U);
+  const auto summary = kept_.of<summary_t>(ipc::kSummaryChannel);
+  ASSERT_EQ(summary.size(), 1U);
+  EXPECT_EQ(summary[0].times_backwards, 4);
+  EXPECT_EQ(summary[0].images_undecodable, 5);
+  EXPECT_EQ(summary[0].calibration_hash, "calibration");
+  EXPECT_EQ(summary[0].keyframes_made, static_cast<std::int64_t>(end.counts.mapping.keyframes_made));
+}
+
+TEST_F(SessionTest, ARecordedFrameTakesNoMoreOfMappingThanItTookThen) {
+  RecordedChance nothing_taken;
+  for (int i = 0; i < 30; ++i) {
+    const FrameOutput& frame = process(i, &nothing_taken);
+    EXPECT_EQ(frame.result.taken.replies, 0U);
+    EXPECT_EQ(frame.result.state, slam::State::kInitialising);
+  }
+  RecordedChance first_view;
+  first_view.taken.replies = 1;
+  first_view.chance.age_us = 1234;
+  const FrameOutput& frame = process(30, &first_view);
+  EXPECT_EQ(frame.result.taken.replies, 1U);
+  EXPECT_EQ(frame.age_us, 1234);
+}
+
+}  // namespace
+}  // namespace farpoint::daemon

@@ -1,0 +1,201 @@
+#include "slam/front_end.h"
+
+#include <gtest/gtest.h>
+
+#include "slam/back_end.h"
+#include "tests/slam/simulated_drive.h"
+
+namespace farpoint::slam {
+namespace {
+
+class FrontEndTest : public ::testing::Test {
+ protected:
+  // One frame in lockstep.
+  const FrameResult& run(FeatureInput&& input) {
+    front_end_.track(std::move(input), TakeLimit{});
+    work();
+    return front_end_.take_replies_at_once();
+  }
+  // Mapping works on all jobs.
+  void work() {
+    while (back_end_.step()) {
+      if (back_end_.reply().view) newest_view_ = back_end_.reply().view->sequence;
+      back_end_.hand_over();
+    }
+  }
+  // Until the map has settled and tracking is valid; false where that does not happen.
+  [[nodiscard]] bool run_until_tracking() {
+    for (int i = 0; i < 120; ++i)
+      if (run(drive_.next()).state == State::kTracking) return true;
+    return false;
+  }
+
+  SimulatedDrive drive_;
+  MappingRings rings_{drive_.config()};
+  FrontEnd front_end_{drive_.config(), drive_.rig(), &rings_};
+  BackEnd back_end_{drive_.config(), drive_.rig(), &rings_};
+  std::uint64_t newest_view_ = 0;
+};
+
+TEST_F(FrontEndTest, AFirstMapSettlesAndIsTracked) {
+  const FrameResult* result = &run(drive_.next());
+  EXPECT_EQ(result->state, State::kInitialising);
+  EXPECT_FALSE(result->has_pose);
+  while (result->state == State::kInitialising) result = &run(drive_.next());
+  EXPECT_EQ(result->state, State::kSettling);
+  EXPECT_TRUE(result->has_pose);
+  EXPECT_EQ(result->map_id, 1);
+  EXPECT_EQ(result->reset_counter, 1U);
+  ASSERT_TRUE(run_until_tracking());
+  EXPECT_GT(front_end_.counts().mapping.keyframes_made, 2U);
+  EXPECT_EQ(front_end_.counts().maps, 1U);
+}
+
+TEST_F(FrontEndTest, AFrameIsTrackedAgainstTheNewestViewThatIsDue) {
+  ASSERT_TRUE(run_until_tracking());
+  // No keyframe under way: every view is due.
+  for (int i = 0; i < 10; ++i) run(drive_.next());
+  bool was_behind = false;
+  for (int i = 0; i < 30; ++i) {
+    const std::uint64_t before = newest_view_;
+    const FrameResult& result = run(drive_.next());
+    was_behind = was_behind || result.view_sequence < before;
+    if (!was_behind) EXPECT_EQ(result.view_sequence, before);
+    EXPECT_GE(result.view_sequence + 2, before);  // quick and full view of one keyframe
+    if (result.view_sequence == before) was_behind = false;
+  }
+}
+
+TEST_F(FrontEndTest, TheCountsOfMappingAreThoseOfTheNewestReply) {
+  ASSERT_TRUE(run_until_tracking());
+  front_end_.finish();
+  work();
+  front_end_.take_counts();
+  const MappingCounts &told = front_end_.counts().mapping, &made = back_end_.mapper().counts();
+  EXPECT_EQ(told.keyframes_made, made.keyframes_made);
+  EXPECT_EQ(told.landmarks_made, made.landmarks_made);
+  EXPECT_EQ(told.vmp_made, made.vmp_made);
+  EXPECT_EQ(told.local_ba, made.local_ba);
+  EXPECT_GT(told.local_ba, 0U);
+  EXPECT_EQ(front_end_.counts().keyframes, back_end_.mapper().map().keyframes().size());
+  EXPECT_EQ(front_end_.counts().landmarks, back_end_.mapper().map().landmarks().size());
+}
+
+TEST_F(FrontEndTest, SendsNoKeyframeWhileMappingIsBusy) {
+  ASSERT_TRUE(run_until_tracking());
+  for (int i = 0; i < 5; ++i) run(drive_.next());
+  const std::uint64_t dropped = front_end_.counts().keyframes_dropped;
+  int keyframes = 0;
+  for (int i = 0; i < 25; ++i)
+    keyframes += front_end_.track(drive_.next(), {.replies_by_delay = false}).keyframe ? 1 : 0;
+  EXPECT_EQ(keyframes, 1);
+  EXPECT_LE(rings_.jobs.size(), 2U);  // and the one that poses frames from before the map
+  EXPECT_GT(front_end_.counts().keyframes_dropped, dropped);
+}
+
+TEST_F(FrontEndTest, APlaceFoundAgainIsPublishedOnceTheNextFrameConfirmsIt) {
+  ASSERT_TRUE(run_until_tracking());
+  for (int i = 0; i < 20; ++i) run(drive_.next());
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(run(drive_.next_blind()).state, State::kLost);
+  const FrameResult first = run(drive_.next());
+  EXPECT_EQ(first.state, State::kRelocalising);
+  EXPECT_FALSE(first.has_pose);
+  EXPECT_GT(first.inliers, 30);
+  const FrameResult second = run(drive_.next());
+  EXPECT_TRUE(is_valid(second.state));
+  EXPECT_TRUE(second.has_pose);
+  EXPECT_EQ(second.map_id, 1);
+  EXPECT_EQ(second.reset_counter, 1U);
+  EXPECT_EQ(front_end_.counts().lost, 1U);
+}
+
+TEST_F(FrontEndTest, AMotionThatWasNotSeenIsNotAddedToOdom) {
+  ASSERT_TRUE(run_until_tracking());
+  SE3 T_odom_body, T_map_body;
+  for (int i = 0; i < 20; ++i) {
+    const FrameResult& result = run(drive_.next());
+    T_odom_body = result.T_odom_body, T_map_body = result.T_map_body;
+  }
+  for (int i = 0; i < 8; ++i) run(drive_.next_blind());
+  run(drive_.next());
+  const FrameResult& back = run(drive_.next());
+  ASSERT_TRUE(back.has_pose);
+  EXPECT_GT((back.T_map_body.t - T_map_body.t).norm(), 0.0);
+  EXPECT_LT((back.T_odom_body.t - T_odom_body.t).norm(), 1e-9);
+}
+
+TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
+  ASSERT_TRUE(run_until_tracking());
+  for (int i = 0; i < 30; ++i) run(drive_.next());
+  int lost = 0;
+  while (run(drive_.next_unknown()).state != State::kInitialising) ASSERT_LT(++lost, 40);
+  EXPECT_GE(lost, 15);
+  EXPECT_EQ(front_end_.counts().maps, 1U);
+  const FrameResult* result = &run(drive_.next());
+  for (int i = 0; i < 60 && result->state == State::kInitialising; ++i) result = &run(drive_.next());
+  EXPECT_EQ(result->map_id, 2);
+  EXPECT_EQ(result->reset_counter, 2U);
+  EXPECT_EQ(front_end_.counts().maps, 2U);
+}
+
+// Mapping is behind: it answers a keyframe of the old map after that was given up.
+TEST_F(FrontEndTest, TakesNoViewOfAMapThatItGaveUp) {
+  ASSERT_TRUE(run_until_tracking());
+  for (int i = 0; i < 30; ++i) run(drive_.next());
+  // A keyframe on its way, then nothing but unknown frames.
+  const TakeLimit at_once{.replies_by_delay = false};
+  for (int i = 0; i < 20 && !front_end_.track(drive_.next(), at_once).keyframe; ++i) continue;
+  ASSERT_GE(rings_.jobs.size(), 1U);
+  TakeLimit none{.replies_by_delay = false, .up_to = {0, 0, 0}};
+  int lost = 0;
+  while (front_end_.track(drive_.next_unknown(), none).state != State::kInitialising) ASSERT_LT(++lost, 40);
+  const std::uint64_t before = front_end_.track(drive_.next_unknown(), none).taken.replies;
+  work();
+  const FrameResult& after = front_end_.track(drive_.next_unknown(), at_once);
+  EXPECT_GT(after.taken.replies, before) << "replies are taken all the same";
+  EXPECT_EQ(after.state, State::kInitialising);
+  EXPECT_FALSE(after.has_pose);
+  EXPECT_EQ(after.view_sequence, 0U);
+  EXPECT_EQ(after.jobs_under_way, 0);
+}
+
+TEST_F(FrontEndTest, EachFrameTakesTheSamplesUpToItsTime) {
+  FeatureInput first = drive_.next(), second = drive_.next();
+  const auto sample = [](std::int64_t utime) {
+    ImuSample s;
+    s.utime = utime;
+    return s;
+  };
+  EXPECT_TRUE(front_end_.add(sample(first.utime)));
+  EXPECT_TRUE(front_end_.add(sample(first.utime + 1)));
+  EXPECT_TRUE(front_end_.add(sample(second.utime + 1)));
+  WheelSample wheels;
+  wheels.utime = second.utime;
+  wheels.speed_m_per_s = 12.5;
+  EXPECT_TRUE(front_end_.add(wheels));
+  EXPECT_EQ(run(std::move(first)).taken.imu, 1U);
+  EXPECT_EQ(front_end_.counts().wheels.used, 0U);
+  const FrameResult& result = run(std::move(second));
+  EXPECT_EQ(result.taken.imu, 2U);
+  EXPECT_EQ(result.taken.wheels, 1U);
+  EXPECT_EQ(front_end_.counts().imu.used, 2U);
+  ASSERT_EQ(front_end_.wheels().size(), 1U);
+  EXPECT_EQ(front_end_.wheels()[0].speed_m_per_s, 12.5);
+}
+
+TEST_F(FrontEndTest, RejectsATimeNotAfterTheLastAndAnotherCamera) {
+  FeatureInput frame = drive_.next();
+  const std::int64_t utime = frame.utime;
+  run(std::move(frame));
+  FeatureInput again = drive_.next();
+  again.utime = utime;
+  EXPECT_FALSE(run(std::move(again)).has_pose);
+  FeatureInput other = drive_.next();
+  other.camera = 1;
+  run(std::move(other));
+  EXPECT_EQ(front_end_.counts().frames, 1U);
+  EXPECT_EQ(front_end_.counts().frames_rejected, 2U);
+}
+
+}  // namespace
+}  // namespace farpoint::slam
