@@ -42,6 +42,7 @@ std::string stopped_by(int signal, const char* when) {
 // stopped ends like one whose log is over, and says so.
 int conclude(const Options& options, const LogFrameSource& source, std::int64_t frames_dropped,
              std::vector<double> cpu_ms, Session* session, Outputs* outputs) {
+  outputs->farewell();
   const int signal = StopOnSignal::signal();
   if (session == nullptr) throw std::runtime_error(stopped_by(signal, "before the first image"));
   const RunEnd& end = session->finish(source.counts());
