@@ -47,6 +47,7 @@ bool parse_frame(std::string_view text, CanFrame* frame) {
   frame->extended = hash == kExtendedDigits;
   const std::uint32_t most_id = frame->extended ? kMaxExtendedCanId : kMaxStandardCanId;
   if (!parse_number(text.substr(0, hash), 16, &frame->id) || frame->id > most_id) return false;
+  if (text.ends_with("##")) return false;  // no flags
   std::size_t most = 0;
   const std::string_view bytes = data_of(text, hash, &most);
   if (bytes.size() % 2 != 0 || bytes.size() / 2 > most) return false;

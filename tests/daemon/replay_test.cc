@@ -517,7 +517,9 @@ void expect_can_equals_live(const std::string& can_log, const std::string& live)
                                  Eigen::AngleAxisd(e["Pitch"] * kDegree, Eigen::Vector3d::UnitY()) *
                                  Eigen::AngleAxisd(e["Roll"] * kDegree, Eigen::Vector3d::UnitX());
     // The rates about the other two axes are not on the bus.
-    if (e["Age"] == 0.0) EXPECT_LE(slam::so3_log(T.q.conjugate() * q).norm() / kDegree, 0.01) << utime;
+    if (e["Age"] == 0.0) {
+      EXPECT_LE(slam::so3_log(T.q.conjugate() * q).norm() / kDegree, 0.01) << utime;
+    }
   }
   EXPECT_EQ(used.size(), poses.size());
   EXPECT_EQ(epochs.rbegin()->second["State"], static_cast<double>(status_t::STATE_STOPPED));
@@ -544,7 +546,9 @@ TEST_F(SyntheticRun, WithoutAnAssumedScaleTheCanLogHasNoPositionOrVelocity) {
       EXPECT_TRUE(std::isnan(e[name])) << name << " at " << utime;
     }
     EXPECT_EQ(e["ScaleState"], 0.0);
-    if (utime != stopped && e.contains("ScaleSource")) EXPECT_EQ(e["ScaleSource"], 0.0);
+    if (utime != stopped && e.contains("ScaleSource")) {
+      EXPECT_EQ(e["ScaleSource"], 0.0);
+    }
     with_heading += std::isnan(e["Heading"]) ? 0 : 1;
   }
   EXPECT_GE(with_heading, 40);

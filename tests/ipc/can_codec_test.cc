@@ -199,7 +199,9 @@ TEST(Dbc, BeforeTheFirstFrameNoNumberIsAvailable) {
   for (const auto& [id, message] : dbc()) {
     for (const auto& [name, signal] : message.signals) {
       for (const auto& [raw, text] : signal.values)
-        if (text == "not available") EXPECT_EQ(signal.at_start, raw) << name;
+        if (text == "not available") {
+          EXPECT_EQ(signal.at_start, raw) << name;
+        }
     }
   }
 }
@@ -326,7 +328,9 @@ TEST(CanCodec, EachFrameCountsAndThoseOfEveryEpochShareTheCounter) {
       EXPECT_EQ(frame.size, 8);
       const std::size_t i = frame.id - layout.base_id;
       EXPECT_EQ(frame.data[1] & 0x0f, sent[frame.id] % 15);
-      if (layout.every.at(i) == 1) EXPECT_EQ(frame.data[1] & 0x0f, n % 15);
+      if (layout.every.at(i) == 1) {
+        EXPECT_EQ(frame.data[1] & 0x0f, n % 15);
+      }
       EXPECT_EQ(checkers.at(i).check(frame), E2eStatus::kOk);
       ++sent[frame.id];
     }
