@@ -70,7 +70,7 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
 int replay_in_order(const Options& options, const Config& config, Schedule* schedule) {
   const StopOnSignal stop;
   LogFrameSource source(options.replay, config.camera.index);
-  Outputs outputs(options, config);
+  Outputs outputs(options, config, Outputs::Use::kReplay, schedule != nullptr ? schedule->boot_counter() : 0);
   std::unique_ptr<Session> session;
   std::vector<double> cpu_ms;  // of decoding and tracking, a frame
   std::int64_t frames_dropped = 0;

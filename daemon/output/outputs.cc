@@ -7,7 +7,8 @@
 
 namespace farpoint::daemon {
 
-Outputs::Outputs(const Options& options, const Config& config, Use use) : options_(options), use_(use) {
+Outputs::Outputs(const Options& options, const Config& config, Use use, std::int32_t boot_counter)
+    : options_(options), use_(use), boot_counter_(boot_counter) {
   if (use == Use::kLive) count_start(config);
   try {
     open_files(config);
@@ -21,8 +22,9 @@ Outputs::Outputs(const Options& options, const Config& config, Use use) : option
 void Outputs::count_start(const Config& config) {
   const BootCounter counter = next_boot_counter(state_folder(config.state.folder));
   boot_counter_ = counter.value;
+  const auto level = config.state.folder == "auto" ? spdlog::level::info : spdlog::level::warn;
   if (!counter.problem.empty())
-    spdlog::warn("boot counter {}: a random number, since {}", boot_counter_, counter.problem);
+    spdlog::log(level, "boot counter {}: a random number, since {}", boot_counter_, counter.problem);
   else
     spdlog::info("boot counter {}", boot_counter_);
 }

@@ -23,8 +23,10 @@ class Outputs {
   // Live, the configuration asks, and a network that cannot be used is an error: the service manager tries
   // again.
   enum class Use : std::uint8_t { kReplay, kLive };
-  // Throws UsageError where a file cannot be written, std::runtime_error as said above.
-  Outputs(const Options& options, const Config& config, Use use = Use::kReplay);
+  // boot_counter: in replay, that of the run that is repeated, 0 for none. Throws UsageError where a file
+  // cannot be written, std::runtime_error as said above.
+  Outputs(const Options& options, const Config& config, Use use = Use::kReplay,
+          std::int32_t boot_counter = 0);
 
   // The bus first: it is what a controller waits for.
   [[nodiscard]] std::vector<PoseSink*> sinks();

@@ -54,7 +54,7 @@ TEST_F(OnTheBus, EpochsGoOutAtTheRateBeforeTheFirstImageAndWhateverImagesDo) {
   sender_->send_on(receiver_.bus(true));
   run(0.1);
   EXPECT_EQ(epochs().size(), 5U);
-  EXPECT_EQ(epochs().back().at("State"), status_t::STATE_STARTING);
+  EXPECT_EQ(epochs().back().at("State"), int{status_t::STATE_STARTING});
   EXPECT_TRUE(std::isnan(epochs().back().at("Age")));
   for (int i = 0; i < 20; ++i) {  // images in a burst, then none
     image(now_s_ - 0.030);
@@ -91,7 +91,7 @@ TEST_F(OnTheBus, ALatePublicationMakesNothingValidForLonger) {
   ASSERT_EQ(epochs().size(), 5U);
   EXPECT_EQ(epochs()[2].at("PoseValid"), 1.0);  // 0.24 s
   EXPECT_EQ(epochs()[3].at("PoseValid"), 0.0);
-  EXPECT_EQ(epochs()[3].at("State"), status_t::STATE_LOST);
+  EXPECT_EQ(epochs()[3].at("State"), int{status_t::STATE_LOST});
   EXPECT_TRUE(std::isnan(epochs()[3].at("PositionX")) && std::isnan(epochs()[3].at("VelocityX")));
 }
 
@@ -164,7 +164,7 @@ TEST_F(OnTheBus, TheLastEpochSaysStoppedAndGivesNoNumber) {
   EXPECT_EQ(epochs().back().at("PoseValid"), 1.0);
   sender_.reset();  // however the run ends
   receiver_.take();
-  EXPECT_EQ(epochs().back().at("State"), status_t::STATE_STOPPED);
+  EXPECT_EQ(epochs().back().at("State"), int{status_t::STATE_STOPPED});
   EXPECT_EQ(epochs().back().at("PoseValid"), 0.0);
   for (const char* name : {"Age", "PositionX", "Heading", "VelocityX", "YawRate"})
     EXPECT_TRUE(std::isnan(epochs().back().at(name))) << name;
