@@ -13,6 +13,7 @@
 #include "daemon/input/camera_source.h"
 #include "daemon/input/recorder.h"
 #include "daemon/input/second_camera.h"
+#include "daemon/input/wheel_source.h"
 #include "daemon/output/outputs.h"
 #include "daemon/output/run_summary.h"
 #include "daemon/pipeline/session.h"
@@ -109,6 +110,7 @@ class LiveRun {
   }
   [[nodiscard]] std::unique_ptr<SecondCamera> open_second(std::unique_ptr<drivers::Camera> camera) const;
   void open_recorder();
+  void open_wheels();
   void run_threads(const ThreadHooks& hooks);
   void tick(const std::function<Config()>& reload);
   void take_over(const std::function<Config()>& reload);
@@ -126,6 +128,7 @@ class LiveRun {
   ServiceManager manager_;
   Outputs outputs_;
   std::optional<Recorder> recorder_;
+  std::unique_ptr<WheelSource> wheels_;  // null: none is configured
   std::optional<ControlSocket> control_;
   std::unique_ptr<SecondCamera> second_;  // null: none is configured
   CameraSource source_;
@@ -152,6 +155,7 @@ LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* 
   open_control();
   if (second_) source_.pair_with(second_.get(), config.camera.pair_tolerance_us);
   if (!options.record.empty()) open_recorder();
+  open_wheels();
 }
 
 std::unique_ptr<SecondCamera> LiveRun::open_second(std::unique_ptr<drivers::Camera> camera) const {
@@ -170,6 +174,30 @@ void LiveRun::open_recorder() {
   }
   source_.record_to(&*recorder_);
   if (second_) second_->record_to(&*recorder_);
+}
+
+void LiveRun::open_wheels() {
+  const CanConfig& can = config_.can;
+  if (can.wheels_dbc == "none" || can.wheel_signals == "none") return;
+  std::optional<drivers::WheelReader> reader;
+  try {
+    reader.emplace(can.wheels_dbc, can.wheel_signals);
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(std::string("configuration: can: ") + error.what());
+  }
+  const bool named = options_.can_interface && !options_.can_interface->empty();
+  if (!options_.can_interface && !can.enabled) return;
+  drivers::CanOptions options;
+  options.wanted_ids = reader->ids();
+  options.fd = can.fd;
+  options.wait_for_interface = true;
+  try {
+    auto bus = std::make_unique<drivers::SocketCan>(named ? *options_.can_interface : can.interface, options);
+    wheels_ = std::make_unique<WheelSource>(std::move(bus), std::move(*reader));
+    outputs_.publish_wheels_of(wheels_.get());
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; the run goes on without wheel speeds", error.what());
+  }
 }
 
 std::unique_ptr<Session> LiveRun::open_session() {
@@ -233,7 +261,13 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
     second_capture.emplace(SecondCamera::kThread, config_.realtime, config_.realtime.capture, &realtime_,
                            [this] { second_->run(); });
   const StopAtEnd stop_second(second_.get());
+  std::optional<Thread> wheels;
+  if (wheels_)
+    wheels.emplace(WheelSource::kThread, config_.realtime, ThreadConfig{}, &realtime_,
+                   [this] { wheels_->run(); });
+  const StopAtEnd stop_wheels(wheels_.get());
   pipeline_.run(hooks);
+  outputs_.farewell();
   manager_.stopping();
 }
 

@@ -42,6 +42,7 @@ std::string stopped_by(int signal, const char* when) {
 // stopped ends like one whose log is over, and says so.
 int conclude(const Options& options, const LogFrameSource& source, std::int64_t frames_dropped,
              std::vector<double> cpu_ms, Session* session, Outputs* outputs) {
+  outputs->farewell();
   const int signal = StopOnSignal::signal();
   if (session == nullptr) throw std::runtime_error(stopped_by(signal, "before the first image"));
   const RunEnd& end = session->finish(source.counts());
@@ -69,7 +70,7 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
 int replay_in_order(const Options& options, const Config& config, Schedule* schedule) {
   const StopOnSignal stop;
   LogFrameSource source(options.replay, config.camera.index);
-  Outputs outputs(options, config);
+  Outputs outputs(options, config, Outputs::Use::kReplay, schedule != nullptr ? schedule->boot_counter() : 0);
   std::unique_ptr<Session> session;
   std::optional<MeasurementFeed> feed;
   std::vector<double> cpu_ms;  // of decoding and tracking, a frame

@@ -13,58 +13,61 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 // As status_t.lcm says; the codec needs nothing else of LCM.
 constexpr std::uint8_t kScaleAssumed = 1, kScaleMetric = 2;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-// What one unit of a raw value means, as in the DBC.
-constexpr double kPosition_m = 0.01;
-constexpr double kAngle_deg = 0.01;
-constexpr double kVelocity_m_s = 0.005;
-constexpr double kYawRate_deg_s = 0.05;
-constexpr double kSigmaPosition_m = 0.001;
-constexpr double kSigmaAngle_deg = 0.001;
-constexpr double kSigmaVelocity_m_s = 0.01;
-constexpr double kSigmaYawRate_deg_s = 0.01;
-constexpr double kAge_s = 0.0001;
 constexpr double kCoarseAge_s = 0.01;
+constexpr unsigned kCoarseAgeStart = 12, kCoarseAgeBits = 4;
 
-// Fills one frame's bits from bit 12 on (Intel order: bit n of the frame is bit n of a little-endian number);
-// CRC and counter come last.
-class Packer {
+using Raw = std::array<std::uint64_t, kCanSignals>;
+
+constexpr std::uint64_t ones(unsigned length) {
+  return (std::uint64_t{1} << length) - 1;
+}
+
+// The most negative number says 'not available'. A value out of range is not available, never wrapped or
+// clipped, since a clipped position would be a wrong one.
+std::uint64_t signed_raw(unsigned length, double value, double step) {
+  const double limit = static_cast<double>((std::int64_t{1} << (length - 1)) - 1);
+  const double raw = std::round(value / step);
+  const bool fits = raw >= -limit && raw <= limit;  // false for NaN
+  const std::int64_t not_available = -(std::int64_t{1} << (length - 1));
+  return static_cast<std::uint64_t>(fits ? static_cast<std::int64_t>(raw) : not_available) & ones(length);
+}
+
+// Not negative, rounded up: neither age nor uncertainty may look smaller than it is. All ones say 'not
+// available', one less 'more than can be said'.
+std::uint64_t magnitude_raw(unsigned length, double value, double step) {
+  constexpr double kRounding = 1e-6;  // 0.0123 / 0.0001 is a little over 123
+  const std::uint64_t not_available = ones(length);
+  if (!(value >= 0) || std::isinf(value)) return not_available;
+  const double most = static_cast<double>(not_available - 1);
+  const double raw = std::max(std::ceil(value / step - kRounding), 0.0);
+  return static_cast<std::uint64_t>(std::min(raw, most));
+}
+
+// Collects the raw value of every signal.
+class RawValues {
  public:
-  Packer& bits(unsigned start, unsigned length, std::uint64_t value) {
-    payload_ |= (value & ((std::uint64_t{1} << length) - 1)) << start;
+  RawValues& code(CanSignal signal, std::uint64_t value) {
+    at(signal) = value & ones(info_of(signal).length);
     return *this;
   }
-  // Signed; the most negative number says 'not available'. Out of range is not available, never wrapped or
-  // clipped: a clipped position would be a wrong one.
-  Packer& signed_value(unsigned start, unsigned length, double value, double unit) {
-    const double limit = static_cast<double>((std::int64_t{1} << (length - 1)) - 1);
-    const double raw = std::round(value / unit);
-    const bool fits = raw >= -limit && raw <= limit;  // false for NaN
-    const std::int64_t not_available = -(std::int64_t{1} << (length - 1));
-    return bits(start, length,
-                static_cast<std::uint64_t>(fits ? static_cast<std::int64_t>(raw) : not_available));
+  RawValues& value(CanSignal signal, bool available, double value) {
+    const CanSignalInfo& info = info_of(signal);
+    const double number = available ? value : kNan;
+    at(signal) = info.kind == CanSignalKind::kSigned ? signed_raw(info.length, number, info.step)
+                                                     : magnitude_raw(info.length, number, info.step);
+    return *this;
   }
-  // Not negative, rounded up: neither age nor uncertainty may look smaller than it is. All ones say 'not
-  // available', one less 'more than can be said'.
-  Packer& magnitude(unsigned start, unsigned length, double value, double unit) {
-    constexpr double kRounding = 1e-6;  // 0.0123 / 0.0001 is a little over 123
-    const std::uint64_t not_available = (std::uint64_t{1} << length) - 1;
-    if (!(value >= 0) || std::isinf(value)) return bits(start, length, not_available);
-    const double most = static_cast<double>(not_available - 1);
-    const double raw = std::max(std::ceil(value / unit - kRounding), 0.0);
-    return bits(start, length, static_cast<std::uint64_t>(std::min(raw, most)));
+  // Three signals that follow each other in CanSignal.
+  RawValues& vector(CanSignal first, bool available, const std::array<double, 3>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+      value(static_cast<CanSignal>(static_cast<std::size_t>(first) + i), available, values[i]);
+    return *this;
   }
-
-  [[nodiscard]] CanFrame frame(CanMessage message, std::uint8_t counter) const {
-    CanFrame out;
-    out.id = can_id(message);
-    for (std::size_t i = 0; i < out.size; ++i) out.data[i] = static_cast<std::uint8_t>(payload_ >> (8 * i));
-    e2e_protect(&out, can_data_id(message), counter);
-    return out;
-  }
+  [[nodiscard]] const Raw& all() const { return raw_; }
 
  private:
-  std::uint64_t payload_ = 0;
+  std::uint64_t& at(CanSignal signal) { return raw_[static_cast<std::size_t>(signal)]; }
+  Raw raw_{};
 };
 
 // An angle into [-180, 180] degrees.
@@ -72,92 +75,58 @@ double wrapped_deg(double angle_rad) {
   return std::remainder(angle_rad * kDegrees, 360.0);
 }
 
-double value_if(bool available, double value) {
-  return available ? value : kNan;
+void put_status(const OdometryEpoch& e, RawValues* out) {
+  out->value(CanSignal::kAge, true, e.age_s)
+      .code(CanSignal::kState, e.state)
+      .code(CanSignal::kScaleState, e.scale_state)
+      .code(CanSignal::kPoseValid, e.pose_valid)
+      .code(CanSignal::kVelocityValid, e.velocity_valid)
+      .code(CanSignal::kResetCounter, e.reset_counter)
+      .code(CanSignal::kBootCounter, e.boot_counter)
+      .code(CanSignal::kFromVision, e.from_vision)
+      .code(CanSignal::kFrame, e.map_frame)
+      .code(CanSignal::kPredicted, e.predicted)
+      .code(CanSignal::kReason, static_cast<std::uint64_t>(e.reason));
 }
 
-struct Available {
-  bool position, angles, velocity, yaw_rate;
-};
-
-Available available(const OdometryEpoch& epoch) {
-  const bool has_scale = epoch.scale_state == kScaleAssumed || epoch.scale_state == kScaleMetric;
-  return {epoch.pose_valid && has_scale, epoch.pose_valid, epoch.velocity_valid && has_scale,
-          epoch.velocity_valid};
+void put_motion(const OdometryEpoch& e, RawValues* out) {
+  const bool has_scale = e.scale_state == kScaleAssumed || e.scale_state == kScaleMetric;
+  const bool position = e.pose_valid && has_scale, velocity = e.velocity_valid && has_scale;
+  out->vector(CanSignal::kPositionX, position, e.position_m)
+      .value(CanSignal::kYawRate, e.velocity_valid, e.yaw_rate_rad_s * kDegrees)
+      .vector(CanSignal::kHeading, e.pose_valid,
+              {wrapped_deg(e.heading_rad), wrapped_deg(e.roll_rad), wrapped_deg(e.pitch_rad)})
+      .vector(CanSignal::kVelocityX, velocity, e.velocity_m_s)
+      .vector(CanSignal::kSigmaPositionX, position, e.sigma_position_m)
+      .vector(CanSignal::kSigmaHeading, e.pose_valid,
+              {e.sigma_heading_rad * kDegrees, e.sigma_roll_rad * kDegrees, e.sigma_pitch_rad * kDegrees})
+      .vector(CanSignal::kSigmaVelocityX, velocity, e.sigma_velocity_m_s)
+      .value(CanSignal::kSigmaYawRate, e.velocity_valid, e.sigma_yaw_rate_rad_s * kDegrees);
 }
 
-Packer status(const OdometryEpoch& epoch) {
-  constexpr std::uint64_t kNoQuality = 0xff;
-  const bool has_quality = epoch.quality >= 0 && epoch.quality <= 100;
-  Packer out;
-  out.magnitude(16, 16, epoch.age_s, kAge_s);
-  out.bits(32, 4, epoch.state).bits(36, 2, epoch.scale_state);
-  out.bits(38, 1, epoch.pose_valid).bits(39, 1, epoch.velocity_valid);
-  out.bits(40, 8, epoch.reset_counter);
-  out.bits(48, 8, has_quality ? static_cast<std::uint64_t>(epoch.quality) : kNoQuality);
-  out.bits(56, 1, epoch.from_vision).bits(57, 1, epoch.map_frame);
-  out.bits(58, 6, static_cast<std::uint64_t>(epoch.map_id));
-  return out;
+void put_diagnosis(const OdometryEpoch& e, RawValues* out) {
+  constexpr std::uint64_t kNoQuality = 0xff, kNoSensor = 0, kMsPeriod_us = 1000;
+  const bool has_quality = e.quality >= 0 && e.quality <= 100;
+  out->code(CanSignal::kQuality, has_quality ? static_cast<std::uint64_t>(e.quality) : kNoQuality)
+      .code(CanSignal::kMapId, static_cast<std::uint64_t>(e.map_id))
+      .code(CanSignal::kLevelled, static_cast<std::uint64_t>(e.levelled))
+      .code(CanSignal::kBodyIsCamera, static_cast<std::uint64_t>(e.body_is_camera))
+      .code(CanSignal::kScaleSource, static_cast<std::uint64_t>(e.scale_source))
+      .value(CanSignal::kScaleSigma, true, e.scale_sigma)
+      .code(CanSignal::kImu, kNoSensor)
+      .code(CanSignal::kWheels, kNoSensor)
+      .code(CanSignal::kLayout, kCanLayoutNumber)
+      .code(CanSignal::kSendTime, static_cast<std::uint64_t>(e.send_time_us) / kMsPeriod_us);
 }
 
-// Three numbers of 16 bits behind the head: signed values ...
-Packer three_values(const std::array<double, 3>& values, double unit) {
-  Packer out;
-  for (unsigned i = 0; i < 3; ++i) out.signed_value(16 + 16 * i, 16, values[i], unit);
-  return out;
-}
-
-// ... and standard deviations.
-Packer three_sigmas(bool available, const std::array<double, 3>& values, double unit) {
-  Packer out;
-  for (unsigned i = 0; i < 3; ++i) out.magnitude(16 + 16 * i, 16, value_if(available, values[i]), unit);
-  return out;
-}
-
-Packer velocity_sigma(const OdometryEpoch& epoch, const Available& has) {
-  Packer out;
-  for (unsigned i = 0; i < 3; ++i) {
-    out.magnitude(16 + 12 * i, 12, value_if(has.velocity, epoch.sigma_velocity_m_s[i]), kSigmaVelocity_m_s);
+// Ors a value into the frame, Intel order.
+void put_bits(CanFrame* frame, unsigned start, unsigned length, std::uint64_t value) {
+  for (unsigned bit = 0; bit < length;) {
+    const unsigned at = start + bit, room = 8 - at % 8;
+    frame->data[at / 8] =
+        static_cast<std::uint8_t>(frame->data[at / 8] | (value >> bit & ones(room)) << at % 8);
+    bit += room;
   }
-  out.magnitude(52, 12, value_if(has.yaw_rate, epoch.sigma_yaw_rate_rad_s * kDegrees), kSigmaYawRate_deg_s);
-  return out;
-}
-
-Packer content(CanMessage message, const OdometryEpoch& epoch, const Available& has) {
-  const auto& position = epoch.position_m;
-  Packer out;
-  switch (message) {
-    case CanMessage::kStatus:
-      return status(epoch);
-    case CanMessage::kPositionXy:
-      out.signed_value(16, 24, value_if(has.position, position[0]), kPosition_m);
-      out.signed_value(40, 24, value_if(has.position, position[1]), kPosition_m);
-      return out;
-    case CanMessage::kPositionZYawRate:
-      out.signed_value(16, 24, value_if(has.position, position[2]), kPosition_m);
-      out.signed_value(40, 16, value_if(has.yaw_rate, epoch.yaw_rate_rad_s * kDegrees), kYawRate_deg_s);
-      return out;
-    case CanMessage::kAttitude:
-      return three_values({value_if(has.angles, wrapped_deg(epoch.heading_rad)),
-                           value_if(has.angles, wrapped_deg(epoch.roll_rad)),
-                           value_if(has.angles, wrapped_deg(epoch.pitch_rad))},
-                          kAngle_deg);
-    case CanMessage::kVelocity:
-      return three_values(
-          {value_if(has.velocity, epoch.velocity_m_s[0]), value_if(has.velocity, epoch.velocity_m_s[1]),
-           value_if(has.velocity, epoch.velocity_m_s[2])},
-          kVelocity_m_s);
-    case CanMessage::kPositionSigma:
-      return three_sigmas(has.position, epoch.sigma_position_m, kSigmaPosition_m);
-    case CanMessage::kAttitudeSigma:
-      return three_sigmas(has.angles,
-                          {epoch.sigma_heading_rad * kDegrees, epoch.sigma_roll_rad * kDegrees,
-                           epoch.sigma_pitch_rad * kDegrees},
-                          kSigmaAngle_deg);
-    case CanMessage::kVelocitySigma:
-      return velocity_sigma(epoch, has);
-  }
-  return out;
 }
 
 }  // namespace
@@ -172,16 +141,46 @@ EulerAngles euler_angles(const std::array<double, 4>& orientation_wxyz) {
 }
 
 CanEpoch CanEncoder::encode(const OdometryEpoch& epoch) noexcept {
-  const Available has = available(epoch);
-  CanEpoch frames;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const auto message = static_cast<CanMessage>(i);
-    Packer packer = content(message, epoch, has);
-    packer.magnitude(12, 4, epoch.age_s, kCoarseAge_s);  // every frame tells its age
-    frames[i] = packer.frame(message, counter_);
+  RawValues values;
+  put_status(epoch, &values);
+  put_motion(epoch, &values);
+  put_diagnosis(epoch, &values);
+  const auto signals = can_signals();
+
+  if (layout_.fd) {
+    CanFrame frame;
+    frame.id = layout_.base_id;
+    frame.extended = layout_.extended;
+    frame.size = kCanFdBytes;
+    for (std::size_t i = 0; i < kCanSignals; ++i)
+      put_bits(&frame, signals[i].fd_start(), signals[i].length, values.all()[i]);
+    e2e5_protect(&frame, layout_.fd_data_id(), fd_counter_++);
+    CanEpoch out;
+    out.add(frame);
+    return out;
   }
-  counter_ = e2e_next(counter_);
-  return frames;
+
+  std::array<CanFrame, kCanMessages> frames{};
+  for (std::size_t i = 0; i < kCanSignals; ++i) {
+    if (signals[i].message == CanMessage::kFdOnly) continue;
+    put_bits(&frames[static_cast<std::size_t>(signals[i].message)], signals[i].start, signals[i].length,
+             values.all()[i]);
+  }
+  CanEpoch out;
+  for (std::size_t i = 0; i < kCanMessages; ++i) {
+    const auto message = static_cast<CanMessage>(i);
+    if (!layout_.is_due(message, epochs_)) continue;
+    CanFrame& frame = frames[i];
+    frame.id = layout_.id(message);
+    frame.extended = layout_.extended;
+    put_bits(&frame, kCoarseAgeStart, kCoarseAgeBits,
+             magnitude_raw(kCoarseAgeBits, epoch.age_s, kCoarseAge_s));
+    e2e_protect(&frame, layout_.data_id(message), counters_[i]);
+    counters_[i] = e2e_next(counters_[i]);
+    out.add(frame);
+  }
+  ++epochs_;
+  return out;
 }
 
 }  // namespace farpoint::ipc

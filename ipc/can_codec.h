@@ -1,37 +1,73 @@
-// Odometry as CAN frames. config/farpoint.dbc describes the same to the receiver; tests hold both together.
+// Odometry as CAN frames of layout 2 (ipc/can_layout.h). config/farpoint.dbc describes the same to the
+// receiver; tests hold both together.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "ipc/can_frame.h"
+#include "ipc/can_layout.h"
 #include "ipc/e2e.h"
 
 namespace farpoint::ipc {
 
-// What one camera frame gave. Metres, radians, seconds. A value that is not finite is sent as 'not
-// available'.
+// Raw values of signal Reason.
+enum class CanReason : std::uint8_t {
+  kNone = 0,
+  kNoImageYet = 1,
+  kNoCamera = 2,
+  kNoPoseInTime = 3,
+  kMapNotStarted = 4,
+  kMapSettling = 5,
+  kTrackingLost = 6,
+  kPlaceNotRecognised = 7,
+  kFewLandmarks = 8,
+  kCalibrationContradicted = 9,
+  kNumberOutOfRange = 10,
+  kStopped = 11,
+  kNotAvailable = 31,
+};
+
+// Raw value of signal State, beyond those of status_t.
+inline constexpr std::uint8_t kCanStateLost = 5, kCanStateStopped = 8;
+
+// Raw values of Levelled and BodyIsCamera.
+enum class CanYesNo : std::uint8_t { kNo = 0, kYes = 1, kNotAvailable = 3 };
+
+// Raw values of ScaleSource that this version sends.
+enum class CanScaleSource : std::uint8_t { kNone = 0, kAssumed = 1, kNotAvailable = 15 };
+
+// What is sent at one time. Metres, radians, seconds. A value that is not finite is sent as 'not available'.
 struct OdometryEpoch {
-  std::uint8_t state = 0;        // status_t::STATE_*
+  std::uint8_t state = 0;        // status_t::STATE_*, or kCanStateStopped
   std::uint8_t scale_state = 0;  // status_t::SCALE_*; unknown: no position, no velocity
   bool pose_valid = false;       // else no position, no angles
   bool velocity_valid = false;   // else no velocity, no yaw rate
   bool from_vision = false;
+  bool predicted = false;
   bool map_frame = false;           // the pose is of the map frame (may jump), else of odom (never jumps)
   std::uint32_t reset_counter = 0;  // sent modulo 256
-  std::int32_t map_id = 0;          // sent modulo 64
-  int quality = -1;                 // 0..100, anything else: not available
-  double age_s = 0;                 // from mid-exposure to sending
+  std::uint8_t boot_counter = 0;
+  CanReason reason = CanReason::kNone;
+  std::int32_t map_id = 0;  // sent modulo 256
+  int quality = -1;         // 0..100, anything else: not available
+  double age_s = 0;         // from mid-exposure to sending
+  std::int64_t send_time_us = 0;
 
   std::array<double, 3> position_m{};  // x y z
   double heading_rad = 0, roll_rad = 0, pitch_rad = 0;
   std::array<double, 3> velocity_m_s{};  // body axes
   double yaw_rate_rad_s = 0;             // about the body's z axis
   // Standard deviations; negative or not finite: not available.
-  std::array<double, 3> sigma_position_m{};
-  double sigma_heading_rad = 0, sigma_roll_rad = 0, sigma_pitch_rad = 0;
-  std::array<double, 3> sigma_velocity_m_s{};
-  double sigma_yaw_rate_rad_s = 0;
+  std::array<double, 3> sigma_position_m{-1.0, -1.0, -1.0};
+  double sigma_heading_rad = -1.0, sigma_roll_rad = -1.0, sigma_pitch_rad = -1.0;
+  std::array<double, 3> sigma_velocity_m_s{-1.0, -1.0, -1.0};
+  double sigma_yaw_rate_rad_s = -1.0;
+
+  CanYesNo levelled = CanYesNo::kNotAvailable, body_is_camera = CanYesNo::kNotAvailable;
+  CanScaleSource scale_source = CanScaleSource::kNotAvailable;
+  double scale_sigma = -1.0;  // relative
 };
 
 // Heading (yaw, left positive), pitch (nose down positive) and roll of a body with REP-103 axes: R =
@@ -41,37 +77,31 @@ struct EulerAngles {
 };
 [[nodiscard]] EulerAngles euler_angles(const std::array<double, 4>& orientation_wxyz);
 
-// The frames of one epoch, in the order of sending; identifiers and Data IDs.
-enum class CanMessage : std::uint8_t {
-  kStatus = 0,
-  kPositionXy,
-  kPositionZYawRate,
-  kAttitude,
-  kVelocity,
-  kPositionSigma,
-  kAttitudeSigma,
-  kVelocitySigma,
-};
-inline constexpr std::size_t kCanFramesPerEpoch = 8;
-inline constexpr std::uint32_t kCanBaseId = 0x300;       // identifier = base + message
-inline constexpr std::uint16_t kCanBaseDataId = 0x4650;  // E2E Data ID = base + message
-
-[[nodiscard]] constexpr std::uint32_t can_id(CanMessage message) {
-  return kCanBaseId + static_cast<std::uint32_t>(message);
-}
-[[nodiscard]] constexpr std::uint16_t can_data_id(CanMessage message) {
-  return static_cast<std::uint16_t>(kCanBaseDataId + static_cast<std::uint16_t>(message));
-}
-
-using CanEpoch = std::array<CanFrame, kCanFramesPerEpoch>;
-
-// Numbers epochs: all frames of one carry the same counter. No allocation, never throws.
-class CanEncoder {
+// The frames of one epoch, in the order of sending. The first is the status frame, or CAN FD's only frame.
+class CanEpoch {
  public:
-  [[nodiscard]] CanEpoch encode(const OdometryEpoch& epoch) noexcept;
+  [[nodiscard]] std::span<const CanFrame> frames() const { return {frames_.data(), size_}; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  void add(const CanFrame& frame) { frames_.at(size_++) = frame; }
 
  private:
-  std::uint8_t counter_ = 0;
+  std::array<CanFrame, kCanMessages> frames_{};
+  std::size_t size_ = 0;
+};
+
+// Encodes and counts. The counter of a message goes on by one each time it is encoded, so that messages which
+// go out with every epoch carry the same. No allocation, never throws.
+class CanEncoder {
+ public:
+  explicit CanEncoder(const CanLayout& layout = {}) : layout_(layout) {}
+  [[nodiscard]] CanEpoch encode(const OdometryEpoch& epoch) noexcept;
+  [[nodiscard]] const CanLayout& layout() const { return layout_; }
+
+ private:
+  CanLayout layout_;
+  std::uint64_t epochs_ = 0;
+  std::array<std::uint8_t, kCanMessages> counters_{};
+  std::uint8_t fd_counter_ = 0;
 };
 
 }  // namespace farpoint::ipc

@@ -1,5 +1,6 @@
 #include "ipc/candump.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cinttypes>
 #include <cstdio>
@@ -10,8 +11,8 @@ namespace {
 
 constexpr std::int64_t kMicrosPerSecond = 1'000'000;
 constexpr std::size_t kMicrosDigits = 6;
-constexpr std::uint32_t kMaxId = 0x7ff;
-constexpr std::size_t kMaxClassicBytes = 8;
+constexpr std::size_t kMaxClassicBytes = 8, kMaxFdBytes = 64;
+constexpr std::size_t kStandardDigits = 3, kExtendedDigits = 8;
 
 // All of the text as a number, else false.
 template <typename Number>
@@ -32,12 +33,24 @@ bool parse_time(std::string_view text, std::int64_t* utime) {
   return true;
 }
 
+// The data behind the sign of their kind; *most: bytes that this kind can have.
+std::string_view data_of(std::string_view text, std::size_t hash, std::size_t* most) {
+  const bool fd = text.substr(hash).starts_with("##");
+  *most = fd ? kMaxFdBytes : kMaxClassicBytes;
+  constexpr std::size_t kFlags = 1;  // a digit
+  return text.substr(std::min(text.size(), hash + (fd ? 2 + kFlags : 1)));
+}
+
 bool parse_frame(std::string_view text, CanFrame* frame) {
   const std::size_t hash = text.find('#');
-  if (hash != 3) return false;  // 8 digits are an extended identifier
-  const std::string_view bytes = text.substr(hash + 1);
-  if (!parse_number(text.substr(0, hash), 16, &frame->id) || frame->id > kMaxId) return false;
-  if (bytes.size() % 2 != 0 || bytes.size() / 2 > kMaxClassicBytes) return false;
+  if (hash != kStandardDigits && hash != kExtendedDigits) return false;
+  frame->extended = hash == kExtendedDigits;
+  const std::uint32_t most_id = frame->extended ? kMaxExtendedCanId : kMaxStandardCanId;
+  if (!parse_number(text.substr(0, hash), 16, &frame->id) || frame->id > most_id) return false;
+  if (text.ends_with("##")) return false;  // no flags
+  std::size_t most = 0;
+  const std::string_view bytes = data_of(text, hash, &most);
+  if (bytes.size() % 2 != 0 || bytes.size() / 2 > most) return false;
   frame->size = static_cast<std::uint8_t>(bytes.size() / 2);
   frame->data.fill(0);
   for (std::size_t i = 0; i < frame->size; ++i) {
@@ -53,9 +66,9 @@ CandumpWriter::CandumpWriter(std::string path, std::string interface, bool fd)
 
 void CandumpWriter::write(std::int64_t utime, std::span<const CanFrame> frames) {
   for (const CanFrame& frame : frames) {
-    std::fprintf(file_.stream(), "(%010" PRId64 ".%06" PRId64 ") %s %03" PRIX32 "%s",
-                 utime / kMicrosPerSecond, utime % kMicrosPerSecond, interface_.c_str(), frame.id,
-                 separator_);
+    std::fprintf(file_.stream(), "(%010" PRId64 ".%06" PRId64 ") %s %0*" PRIX32 "%s",
+                 utime / kMicrosPerSecond, utime % kMicrosPerSecond, interface_.c_str(),
+                 static_cast<int>(frame.extended ? kExtendedDigits : kStandardDigits), frame.id, separator_);
     for (std::size_t i = 0; i < frame.size; ++i) std::fprintf(file_.stream(), "%02X", frame.data[i]);
     std::fputc('\n', file_.stream());
   }

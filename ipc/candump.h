@@ -1,5 +1,5 @@
 // CAN logs in the format of `candump -L`: "(seconds.micros) interface ID#HEXDATA", CAN FD frames with
-// "ID##1HEXDATA".
+// "ID##1HEXDATA". An identifier has 3 digits, one of 29 bits has 8.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct CandumpLine {
   std::string_view interface;  // within the parsed line
   CanFrame frame;
 };
-// False where the line is not one classic frame with an 11-bit identifier.
+// False where the line is neither a classic frame nor one of CAN FD.
 [[nodiscard]] bool parse_candump_line(std::string_view line, CandumpLine* out);
 
 }  // namespace farpoint::ipc

@@ -23,6 +23,24 @@ std::uint8_t step(std::uint8_t crc, unsigned byte) {
   return kTable[(crc ^ byte) & 0xffU];
 }
 
+constexpr std::uint16_t kPolynomial5 = 0x1021;
+
+constexpr std::array<std::uint16_t, 256> make_table5() {
+  std::array<std::uint16_t, 256> table{};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    unsigned crc = static_cast<unsigned>(i) << 8;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000U) != 0 ? (crc << 1) ^ kPolynomial5 : crc << 1;
+    table[i] = static_cast<std::uint16_t>(crc);
+  }
+  return table;
+}
+
+constexpr std::array<std::uint16_t, 256> kTable5 = make_table5();
+
+std::uint16_t step5(std::uint16_t crc, unsigned byte) {
+  return static_cast<std::uint16_t>((static_cast<unsigned>(crc) << 8) ^ kTable5[(crc >> 8 ^ byte) & 0xffU]);
+}
+
 }  // namespace
 
 std::uint8_t e2e_crc(const CanFrame& frame, std::uint16_t data_id) {
@@ -35,6 +53,20 @@ std::uint8_t e2e_crc(const CanFrame& frame, std::uint16_t data_id) {
 void e2e_protect(CanFrame* frame, std::uint16_t data_id, std::uint8_t counter) {
   frame->data[1] = static_cast<std::uint8_t>((frame->data[1] & 0xf0U) | (counter & 0x0fU));
   frame->data[0] = e2e_crc(*frame, data_id);
+}
+
+std::uint16_t e2e5_crc(const CanFrame& frame, std::uint16_t data_id) {
+  std::uint16_t crc = 0xffff;
+  for (std::size_t i = 2; i < frame.size; ++i) crc = step5(crc, frame.data[i]);
+  crc = step5(crc, data_id & 0xffU);
+  return step5(crc, static_cast<unsigned>(data_id) >> 8);
+}
+
+void e2e5_protect(CanFrame* frame, std::uint16_t data_id, std::uint8_t counter) {
+  frame->data[2] = counter;
+  const std::uint16_t crc = e2e5_crc(*frame, data_id);
+  frame->data[0] = static_cast<std::uint8_t>(crc & 0xffU);
+  frame->data[1] = static_cast<std::uint8_t>(crc >> 8);
 }
 
 E2eStatus E2eChecker::check(const CanFrame& frame) {

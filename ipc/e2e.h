@@ -45,4 +45,15 @@ class E2eChecker {
   int last_ = -1;
 };
 
+// AUTOSAR E2E profile 5 for CAN FD frames. Bytes 0 and 1 are the CRC, low byte first, byte 2 the counter
+// (0..255). The CRC-16 has the polynomial 0x1021, not reflected, start value 0xFFFF and no final XOR. It runs
+// over bytes 2..size-1, then the Data ID's low byte and its high byte. Vector: Data ID 0x1234, 8 bytes, all
+// others zero -> bytes 0 and 1 are 0x1C 0xCA.
+
+// Precondition: frame.size >= 3.
+[[nodiscard]] std::uint16_t e2e5_crc(const CanFrame& frame, std::uint16_t data_id);
+
+// Writes counter and CRC into the frame; its other bytes stay.
+void e2e5_protect(CanFrame* frame, std::uint16_t data_id, std::uint8_t counter);
+
 }  // namespace farpoint::ipc

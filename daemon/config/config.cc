@@ -13,6 +13,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "ipc/can_frame.h"
+
 namespace farpoint::daemon {
 namespace {
 
@@ -228,6 +230,15 @@ void check_second_camera(const CameraConfig& camera, const ConfigOrigins& origin
   }
 }
 
+void check_can(const CanConfig& can, const ConfigOrigins& origins) {
+  try {
+    (void)can_layout(can);
+  } catch (const ConfigError& error) {
+    const std::string what = error.what();
+    fail(place_of(what.substr(0, what.find(':')), origins), what);
+  }
+}
+
 }  // namespace
 
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins) {
@@ -267,6 +278,24 @@ void apply_setting(const std::string& assignment, Config* config, ConfigOrigins*
   assign(*key, assignment.substr(equals + 1), false, "--set", config, origins);
 }
 
+ipc::CanLayout can_layout(const CanConfig& config) {
+  ipc::CanLayout layout;
+  layout.base_id = static_cast<std::uint32_t>(config.base_id);
+  layout.extended = config.extended_ids;
+  layout.base_data_id = static_cast<std::uint16_t>(config.base_data_id);
+  layout.fd = config.fd;
+  layout.rate_hz = config.rate_hz;
+  const std::string problem = ipc::parse_can_messages(config.messages, &layout.every);
+  if (!problem.empty()) throw ConfigError("can.messages: " + problem);
+  const std::uint32_t most = layout.extended ? ipc::kMaxExtendedCanId : ipc::kMaxStandardCanId;
+  const std::uint32_t last = layout.base_id + ipc::kCanMessages - 1;
+  if (last > most) {
+    throw ConfigError(fmt::format("can.base_id: {}, expected at most {} with identifiers of {} bits",
+                                  config.base_id, most + 1 - ipc::kCanMessages, layout.extended ? 29 : 11));
+  }
+  return layout;
+}
+
 void check_relations(const Config& config, const ConfigOrigins& origins) {
   // The place of the pair is where either of the two was last set.
   const auto require_not_above = [&](const std::string& low, const std::string& high) {
@@ -288,6 +317,7 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   }
   require_not_above("camera.exposure_short_us", "camera.exposure_max_us");
   check_second_camera(config.camera, origins);
+  check_can(config.can, origins);
   require_not_above("mapping.quick_view_delay_frames", "mapping.full_view_delay_frames");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");

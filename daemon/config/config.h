@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "ipc/can_layout.h"
 #include "ipc/channels.h"
 #include "slam/config.h"
 
@@ -68,6 +69,11 @@ struct ScaleConfig {
   double assumed = 0.0;  // metres a map unit; 0: unknown
 };
 
+// What a later start is to find.
+struct StateConfig {
+  std::string folder = "auto";  // auto: the service's, none where there is none
+};
+
 struct LcmConfig {
   bool enabled = true;  // live
   std::string url = ipc::kDefaultLcmUrl;
@@ -81,9 +87,13 @@ enum class CanPoseFrame { kMap, kOdom };
 struct CanConfig {
   bool enabled = false;  // live
   std::string interface = "can0";
-  CanPoseFrame frame = CanPoseFrame::kMap;
+  CanPoseFrame frame = CanPoseFrame::kOdom;
   bool fd = false;
-  double rate_hz = 0;  // live; 0: with each image only
+  double rate_hz = 50;  // epochs a second
+  int base_id = 0x680;
+  bool extended_ids = false;
+  int base_data_id = 0x4660;
+  std::string messages = "status position_xy position_z attitude velocity sigmas/5 diagnosis/5";
   std::string wheels_dbc = "none", wheel_signals = "none";
 };
 
@@ -110,6 +120,7 @@ struct RealtimeConfig {
 struct Config {
   LogConfig log;
   ControlConfig control;
+  StateConfig state;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;
@@ -157,6 +168,9 @@ void load_config_text(const std::string& text, const std::string& file_name, Con
 void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins);
 // Checks conditions between keys. Throws ConfigError.
 void check_relations(const Config& config, const ConfigOrigins& origins);
+
+// Layout of the frames of the section can. Throws ConfigError where its keys give none.
+[[nodiscard]] ipc::CanLayout can_layout(const CanConfig& config);
 
 // Canonical text of one key's value. Throws std::out_of_range for an unknown name.
 [[nodiscard]] std::string value_text(const Config& config, const std::string& name);

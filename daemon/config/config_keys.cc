@@ -88,6 +88,8 @@ std::vector<ConfigKey> make_keys() {
 
       text("control.socket", FIELD(control.socket)),
 
+      text("state.folder", FIELD(state.folder)),
+
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
       enumeration("camera.driver", {"v4l2", "libcamera"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
@@ -123,7 +125,11 @@ std::vector<ConfigKey> make_keys() {
       text("can.interface", FIELD(can.interface)),
       enumeration("can.frame", {"map", "odom"}, FIELD(can.frame)),
       boolean("can.fd", FIELD(can.fd)),
-      number("can.rate_hz", "Hz", 0, 1000, FIELD(can.rate_hz)),
+      number("can.rate_hz", "Hz", 1, 1000, FIELD(can.rate_hz)),
+      integer("can.base_id", "", 1, 536870911, FIELD(can.base_id)),
+      boolean("can.extended_ids", FIELD(can.extended_ids)),
+      integer("can.base_data_id", "", 0, 65526, FIELD(can.base_data_id)),
+      text("can.messages", FIELD(can.messages)),
       text("can.wheels_dbc", FIELD(can.wheels_dbc)),
       text("can.wheel_signals", FIELD(can.wheel_signals)),
 

@@ -32,6 +32,7 @@ FrameReporter::FrameReporter(const Config& config, const Names& names, std::vect
   status_.build = names.build;
   status_.configuration_hash = names.configuration_hash;
   status_.calibration_hash = names.calibration_hash;
+  status_.boot_counter = names.boot_counter;
   status_.message.reserve(kCalibrationContradicted.size());
 }
 
@@ -42,6 +43,8 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     silence_.result = since_odom_reset(result);
     frame_ = make_frame_output(silence_.result, assumed_scale_);
     frame_.age_us = package->chance.age_us;
+    frame_.calibration_contradicted = package->counts.calibration_contradicted;
+    frame_.boot_counter = status_.boot_counter;
     if (package->due_s > 0.0) frame_.age_at_s = package->due_s + 1e-6 * static_cast<double>(frame_.age_us);
     ++status_.frames_tracked;
     if (frame_.valid) ++status_.frames_valid;
@@ -90,6 +93,7 @@ const FrameOutput& FrameReporter::report_silence(std::int64_t utime, std::int64_
   silence_.in = in;
   frame_ = make_frame_output(r, assumed_scale_);
   frame_.age_us = age_us;
+  frame_.boot_counter = status_.boot_counter;
   frame_.age_at_s = 1e-6 * static_cast<double>(utime);
   for (PoseSink* sink : sinks_) sink->on_frame(frame_);
   // Its time is that of the news, not of a measurement.

@@ -18,6 +18,7 @@ class FrameReporter {
  public:
   struct Names {
     std::string build, configuration_hash, calibration_hash;
+    std::int32_t boot_counter = 0;
   };
   // `sinks` get each frame in their order, then the publisher; all must outlive the reporter. with_schedule:
   // FARPOINT_SCHEDULE is published too.

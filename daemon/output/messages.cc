@@ -110,9 +110,8 @@ odometry_t make_odometry(const FrameOutput& frame) {
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNan);
   set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
   set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
-  // The odom frame holds the body's last motion, not its place: the map pose's covariance bounds it from
-  // above, and is given while the estimator has none of its own for odom.
-  set_matrix(frame.valid ? r.covariance : slam::Matrix6d::Constant(kNan), m.pose_covariance);
+  // The estimator's covariance is many times smaller than the error of odom: none is given.
+  set_matrix(slam::Matrix6d::Constant(kNan), m.pose_covariance);
   set_matrix(slam::Matrix6d::Constant(kNan), m.twist_covariance);
   m.state = static_cast<std::int8_t>(r.state);
   m.scale_state = static_cast<std::int8_t>(r.scale);
@@ -122,6 +121,7 @@ odometry_t make_odometry(const FrameOutput& frame) {
   m.from_vision = r.has_pose ? 1 : 0;
   m.map_id = r.map_id;
   m.reset_counter = static_cast<std::int32_t>(r.reset_counter);
+  m.boot_counter = frame.boot_counter;
   return m;
 }
 

@@ -16,6 +16,8 @@ struct FrameOutput {
   // Steady clock: when it was of that age. What takes time between then and its sending must not make it
   // younger. 0: there is no common clock.
   double age_at_s = 0;
+  bool calibration_contradicted = false;  // by the images: no pose is valid
+  std::int32_t boot_counter = 0;          // of this start of the daemon; 0 in replay
 };
 
 // The estimator's result with scale.assumed applied (0: none) and its validity decided. A result that is

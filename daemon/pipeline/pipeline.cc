@@ -182,7 +182,7 @@ bool Pipeline::frames_in_work() const {
 
 // How long output may wait while no frame is in work.
 std::int64_t Pipeline::idle_us() const {
-  if (!is_live()) return Notifier::kNoLimit;
+  if (!is_live() && !outputs_.ticks()) return Notifier::kNoLimit;
   const double due_us = std::ceil(1e6 * (outputs_.next_due_s() - steady_s()));
   return static_cast<std::int64_t>(std::clamp(due_us, 0.0, static_cast<double>(kIdleLooksEvery_us)));
 }
@@ -192,6 +192,8 @@ void Pipeline::output() {
     const std::uint32_t seen = arrived_.seen();
     const bool last = tracking_ended_.load(std::memory_order_acquire);
     const bool in_work = frames_in_work();
+    // Whatever becomes of frames: the bus has a clock of its own.
+    outputs_.tick(steady_s());
     if (FramePackage* package = packages_.front()) {
       if (package->result.job != 0) jobs_.notify();
       report_one(package);
@@ -228,7 +230,6 @@ void Pipeline::report_one(FramePackage* package) {
 void Pipeline::report_silence_if_due() {
   if (!is_live()) return;
   const double now_s = steady_s();
-  outputs_.tick(now_s);
   // A frame that is being tracked will speak for itself.
   if (frames_in_work()) return;
   const bool away = away_.load(std::memory_order_acquire);
@@ -255,6 +256,7 @@ void Pipeline::watch() {
     const std::uint32_t seen = ended_.seen();
     const bool last = output_ended_.load(std::memory_order_acquire);
     take_notes(&progress);
+    outputs_.write_logs();
     if (last) break;
     if (StopOnSignal::signal() != 0) stop_.store(true, std::memory_order_relaxed);
     if (hooks_.on_watch) hooks_.on_watch();

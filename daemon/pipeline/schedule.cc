@@ -15,6 +15,9 @@ Schedule::Schedule(const std::string& log) : log_(log) {
     ipc::LogReader reader(log);
     ipc::LogEvent event;
     while (reader.next(&event)) {
+      odometry_t odometry;
+      if (event.channel == ipc::kOdometryChannel && ipc::decode(event.data, &odometry))
+        boot_counter_ = odometry.boot_counter;
       schedule_t m;
       if (event.channel != ipc::kScheduleChannel || !ipc::decode(event.data, &m)) continue;
       const FrameChance chance{m.frames_dropped, m.age_us, m.capture_queue, m.publish_queue,

@@ -20,6 +20,8 @@ class Schedule {
   // Throws InputError where the frame taken last did not do what it did then: another configuration, or
   // another program.
   void check(const slam::FrameResult& result) const;
+  // Of the recorded run, so that what is published again is the same.
+  [[nodiscard]] std::int32_t boot_counter() const { return boot_counter_; }
   // Throws InputError where frames of the schedule have not come.
   void check_end() const;
 
@@ -32,6 +34,7 @@ class Schedule {
   std::string log_;
   std::vector<Entry> entries_;
   std::size_t next_ = 0;
+  std::int32_t boot_counter_ = 0;
 };
 
 }  // namespace farpoint::daemon

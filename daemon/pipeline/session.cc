@@ -48,9 +48,11 @@ void print_calibration(const slam::CalibrationInfo& c) {
 }  // namespace
 
 Session::Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
-                 std::vector<PoseSink*> sinks, Publisher* publisher, bool with_schedule)
+                 std::int32_t boot_counter, std::vector<PoseSink*> sinks, Publisher* publisher,
+                 bool with_schedule)
     : config_(config),
-      names_{build_text(), fmt::format("{:016x}", config_hash(config)), std::move(calibration_hash)},
+      names_{build_text(), fmt::format("{:016x}", config_hash(config)), std::move(calibration_hash),
+             boot_counter},
       estimator_(config.estimator, rig),
       maps_(config),
       publisher_(publisher) {
@@ -144,9 +146,10 @@ void Session::publish_landmarks() {
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
                                       Outputs* outputs, bool with_schedule) {
   const slam::Rig rig = make_rig(calibration, config.camera.index);
+  outputs->set_body_is_camera(calibration.body_name.empty());
   try {
-    return std::make_unique<Session>(config, rig, calibration_hash(calibration), outputs->sinks(),
-                                     outputs->publisher(), with_schedule);
+    return std::make_unique<Session>(config, rig, calibration_hash(calibration), outputs->boot_counter(),
+                                     outputs->sinks(), outputs->publisher(), with_schedule);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(std::string("configuration: ") + error.what());
   } catch (const std::bad_alloc&) {

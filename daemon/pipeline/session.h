@@ -29,7 +29,7 @@ class Session {
  public:
   // Allocates the estimator's memory. `sinks` and the publisher must outlive the session. Throws
   // std::invalid_argument where configuration and rig cannot work together.
-  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
+  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash, std::int32_t boot_counter,
           std::vector<PoseSink*> sinks, Publisher* publisher, bool with_schedule);
 
   // Tracks one image, maps, and hands the outcome to every sink: in lockstep, or as `recorded` tells. `clock`

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <thread>
 
 #include "daemon/replay.h"
@@ -16,7 +17,9 @@
 #include "ipc/log.h"
 #include "tests/daemon/live_fixture.h"
 #include "tests/daemon/system/notify_socket.h"
+#include "tests/ipc/dbc.h"
 #include "tests/ipc/log_events.h"
+#include "tests/support/paths.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -152,6 +155,63 @@ TEST_F(Live, AHungTrackerIsNotCalledAlive) {
   EXPECT_GE(before, 2);
   EXPECT_EQ(meanwhile, 0);
   EXPECT_GE(after, 1);
+}
+
+// What the bus says, by the DBC alone: state, age and validity of each epoch.
+struct Said {
+  double time_s = 0.0, state = 0.0, age_s = 0.0, valid = 0.0, boot = 0.0;
+};
+std::vector<Said> said_on_can(const std::string& log) {
+  const auto dbc = test::read_dbc(test::source_dir() + "/config/farpoint.dbc");
+  std::vector<Said> said;
+  std::ifstream in(log);
+  for (std::string line; std::getline(in, line);) {
+    ipc::CandumpLine parsed;
+    EXPECT_TRUE(ipc::parse_candump_line(line, &parsed)) << line;
+    const test::DbcMessage& message = dbc.at(parsed.frame.id);
+    if (message.name != "FARPOINT_STATUS") continue;
+    const auto value = [&](const char* name) { return message.signals.at(name).value(parsed.frame); };
+    said.push_back({1e-6 * static_cast<double>(parsed.utime), value("State"), value("Age"),
+                    value("PoseValid"), value("BootCounter")});
+  }
+  return said;
+}
+
+TEST_F(Live, TheBusTellsTheTruthFromStartToStopWhileTrackingHangs) {
+  options_.can_log = scratch_.path("out.candump");
+  std::atomic<double> hung_from_s{0.0}, hung_to_s{0.0};
+  std::atomic<int> tracked{0};
+  hooks_.on_tracked = [&](const slam::FrameResult&) {
+    if (++tracked != 30) return;
+    hung_from_s = steady_s();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    hung_to_s = steady_s();
+  };
+  EXPECT_EQ(run([this] { return frames_ >= 45; }), 0);
+  const auto said = said_on_can(options_.can_log);
+  ASSERT_GT(said.size(), 100U);
+  EXPECT_EQ(said.front().state, int{status_t::STATE_STARTING});
+  EXPECT_EQ(said.back().state, int{status_t::STATE_STOPPED});
+  EXPECT_EQ(said.back().valid, 0.0);
+  int meanwhile = 0, valid_before = 0;
+  double longest_s = 0.0;
+  for (std::size_t i = 0; i + 1 < said.size(); ++i) {
+    const Said& s = said[i];
+    EXPECT_EQ(s.boot, said.front().boot);
+    EXPECT_NE(s.boot, 0.0);
+    if (i > 0) longest_s = std::max(longest_s, s.time_s - said[i - 1].time_s);
+    if (s.valid != 0.0) {
+      EXPECT_LE(s.age_s, 0.2501);
+    }
+    valid_before += s.time_s < hung_from_s && s.valid != 0.0;
+    if (s.time_s < hung_from_s + 0.26 || s.time_s > hung_to_s) continue;
+    ++meanwhile;
+    EXPECT_EQ(s.valid, 0.0);
+    EXPECT_EQ(s.state, int{status_t::STATE_LOST});
+  }
+  EXPECT_GE(valid_before, 5);
+  EXPECT_GE(meanwhile, 40);
+  EXPECT_LT(longest_s, 0.5);  // a shared machine; 20 ms where it is free
 }
 
 TEST_F(Live, HangupTakesOverWhatMayChange) {

@@ -20,6 +20,9 @@ from host import can_bus, checks, lcm_log, scenario  # noqa: E402
 RATE_HZ, PERIOD_US = 50.0, 100_000
 CLOCKS_US = (1_000_000, 5_000_000)  # monotonic and real time at the same moment
 LAYOUT = can_bus.layout((ROOT / "config/farpoint.dbc").read_text())
+STATUS = next(i for i, message in LAYOUT.items() if message.name == "FARPOINT_STATUS")
+ATTITUDE = next(i for i, message in LAYOUT.items() if message.name == "FARPOINT_ATTITUDE")
+VELOCITY = next(i for i, message in LAYOUT.items() if message.name == "FARPOINT_VELOCITY")
 
 
 def put(data, message, name, number):
@@ -28,17 +31,24 @@ def put(data, message, name, number):
     return bytearray(whole.to_bytes(len(data), "little"))
 
 
+def due(epoch):
+    """(identifier, counter) of the frames of an epoch; those of every fifth take turns."""
+    for place, identifier in enumerate(sorted(LAYOUT)):
+        every = LAYOUT[identifier].cycle_ms // LAYOUT[STATUS].cycle_ms
+        if (epoch + place) % every == 0:
+            yield identifier, (epoch + place) // every % 15 if every > 1 else epoch % 15
+
+
 def frame(identifier, counter, age_s, valid):
     message = LAYOUT[identifier]
     data = put(bytearray(message.size), message, "Counter", counter)
-    if identifier == can_bus.STATUS:
+    if identifier == STATUS:
         data = put(data, message, "Age", round(age_s * 1e4))
         data = put(data, message, "State", 3 if valid else 1)
         data = put(data, message, "PoseValid", valid)
     if "Heading" in message.signals and not valid:
         data = put(data, message, "Heading", 0x8000)
-    data[0] = can_bus.crc8(message.data_id, data[1:])
-    return data
+    return can_bus.seal(message, data)
 
 
 def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames, mark=lambda number: "#"):
@@ -48,7 +58,7 @@ def bus_log(path, stamps_us, spoil=lambda epoch, frames: frames, mark=lambda num
         for epoch in range(100):
             now_us = stamps_us[0] + 30_000 + 20_000 * epoch
             age_s = 1e-6 * (now_us - max(s for s in stamps_us if s <= now_us - 30_000))
-            frames = {i: frame(i, epoch % 15, age_s, epoch > 10) for i in sorted(LAYOUT)}
+            frames = {i: frame(i, counter, age_s, epoch > 10) for i, counter in due(epoch)}
             for identifier, data in spoil(epoch, frames).items():
                 time_s = 1e-6 * (now_us - CLOCKS_US[0] + CLOCKS_US[1])
                 log.write(f"({time_s:.6f}) vcan0 {identifier:X}{mark(number)}{bytes(data).hex().upper()}\n")
@@ -72,12 +82,12 @@ class Bus(unittest.TestCase):
 
     def test_crc(self):
         def flip(frames):
-            frames[0x303][3] ^= 4
+            frames[ATTITUDE][3] ^= 4
             return frames
         self.assertRegex(self.complaint(self.at_50(flip)), "wrong CRC of FARPOINT_ATTITUDE")
 
     def test_missing_frame(self):
-        self.assertRegex(self.complaint(self.at_50(lambda f: {i: d for i, d in f.items() if i != 0x305})), "7 frames")
+        self.assertRegex(self.complaint(self.at_50(lambda f: {i: d for i, d in f.items() if i != VELOCITY})), "4 frames")
 
     def test_missing_epoch(self):
         self.assertRegex(self.complaint(self.at_50(lambda f: {})), "counter 6 after 4")
@@ -91,17 +101,17 @@ class Bus(unittest.TestCase):
     def test_gap(self):
         # Two of 100 epochs do not come, and the counter goes on as if they had never been due.
         late = lambda epoch, frames: {} if epoch in (50, 51) else (  # noqa: E731
-            frames if epoch < 50 else {i: frame(i, (epoch - 2) % 15, 0.03 + 0.02 * (epoch % 5), True) for i in frames})
+            frames if epoch < 50 else {i: frame(i, c, 0.03 + 0.02 * (epoch % 5), True) for i, c in due(epoch - 2)})
         self.assertIsNone(self.complaint(late))
         self.assertRegex(self.complaint(late, expectations=("valid", "steady")), "gap at most 60 ms, expected .* 40 ms")
 
     def test_age(self):
-        late = lambda epoch, frames: {i: frame(i, epoch % 15, 0.05, epoch > 10) for i in frames}  # noqa: E731
+        late = lambda epoch, frames: {i: frame(i, c, 0.05, epoch > 10) for i, c in due(epoch)}  # noqa: E731
         self.assertRegex(self.complaint(late), "the age is wrong")
 
     def test_heading_without_a_pose(self):
         def heading(frames):
-            frames[can_bus.STATUS] = frame(can_bus.STATUS, 50 % 15, 0.05, False)
+            frames[STATUS] = frame(STATUS, 50 % 15, 0.05, False)
             return frames
         self.assertRegex(self.complaint(self.at_50(heading)), "a heading without a valid pose")
 
@@ -113,7 +123,7 @@ class Bus(unittest.TestCase):
 
     def test_no_pose(self):
         def never(epoch, frames):
-            return {i: frame(i, epoch % 15, 0.03 + 0.02 * (epoch % 5), False) for i in frames}
+            return {i: frame(i, c, 0.03 + 0.02 * (epoch % 5), False) for i, c in due(epoch)}
         self.assertRegex(self.complaint(never), "only 0 epochs with a valid pose")
 
 

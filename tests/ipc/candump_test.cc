@@ -38,7 +38,27 @@ TEST(Candump, CanFdFramesHaveTheirOwnSign) {
   const std::string line(bytes.begin(), bytes.end());
   EXPECT_EQ(line, "(0000000001.000000) can0 301##10000000000000000000000AB\n");
   CandumpLine parsed;
-  EXPECT_FALSE(parse_candump_line(line, &parsed));
+  ASSERT_TRUE(parse_candump_line(line, &parsed));
+  EXPECT_EQ(parsed.frame.size, 12);
+  EXPECT_EQ(parsed.frame.data[11], 0xab);
+}
+
+TEST(Candump, IdentifiersOf29BitsHaveEightDigits) {
+  const test::Scratch scratch;
+  CandumpWriter writer(scratch.path("a.candump"), "can0");
+  CanFrame frame;
+  frame.id = 0x123;
+  frame.size = 1;
+  frame.extended = true;
+  writer.write(1'000'000, {&frame, 1});
+  writer.close();
+  const auto bytes = test::read_bytes(scratch.path("a.candump"));
+  const std::string line(bytes.begin(), bytes.end());
+  EXPECT_EQ(line, "(0000000001.000000) can0 00000123#00\n");
+  CandumpLine parsed;
+  ASSERT_TRUE(parse_candump_line(line, &parsed));
+  EXPECT_TRUE(parsed.frame.extended);
+  EXPECT_EQ(parsed.frame.id, 0x123U);
 }
 
 TEST(Candump, ReadsWhatItWrote) {
@@ -80,11 +100,12 @@ TEST(Candump, RefusesWhatIsNotAFrame) {
                            "(1.000000) can0 ",
                            "(1.000000)  123#00",
                            "(1.000000) can0 800#00",
-                           "(1.000000) can0 12345678#00",
+                           "(1.000000) can0 22345678#00",
                            "(1.000000) can0 123#0",
                            "(1.000000) can0 123#001122334455667788",
                            "(1.000000) can0 123#0G",
-                           "(1.000000) can0 123##000",
+                           "(1.000000) can0 123##00",
+                           "(1.000000) can0 123##",
                            "(1.000000) can0 123#R",
                            "(-1.000000) can0 123#00",
                            "(99999999999999999999.000000) can0 123#00",

@@ -50,7 +50,27 @@ bool read_values(const char* line, std::uint32_t* id, std::string* name,
   return std::string_view(line).find_first_not_of(" ;") == std::string_view::npos;
 }
 
+bool read_start_value(const char* line, std::uint32_t* id, std::string* name, int* number) {
+  Name text;
+  if (std::sscanf(line, "BA_ \"GenSigStartValue\" SG_ %u %127[A-Za-z0-9_] %d;", id, text.data(), number) != 3)
+    return false;
+  *name = text.data();
+  return true;
+}
+
+void set_attribute(std::string_view attribute, int number, DbcMessage* message) {
+  if (attribute == "E2EDataId") message->data_id = number;
+  if (attribute == "E2EProfile") message->e2e_profile = number;
+  if (attribute == "GenMsgCycleTime") message->cycle_ms = number;
+  if (attribute == "GenMsgTimeoutTime") message->timeout_ms = number;
+  if (attribute == "VFrameFormat") message->frame_format = number;
+}
+
 }  // namespace
+
+std::uint32_t dbc_id(const ipc::CanFrame& frame) {
+  return frame.extended ? frame.id | 0x80000000U : frame.id;
+}
 
 std::int64_t DbcSignal::raw(const ipc::CanFrame& frame) const {
   std::int64_t out = 0;
@@ -79,7 +99,8 @@ std::map<std::uint32_t, DbcMessage> read_dbc(const std::string& path) {
     DbcSignal signal;
     std::string name;
     std::uint32_t id = 0;
-    int data_id = 0;
+    Name attribute;
+    int number = 0;
     if (line.starts_with("BO_ ")) {
       EXPECT_TRUE(read_message(line.c_str(), &present, &message)) << line;
       EXPECT_TRUE(out.emplace(present, message).second) << "twice: " << line;
@@ -89,8 +110,11 @@ std::map<std::uint32_t, DbcMessage> read_dbc(const std::string& path) {
     } else if (line.starts_with("VAL_ ")) {
       EXPECT_TRUE(read_values(line.c_str(), &id, &name, &signal.values)) << line;
       out.at(id).signals.at(name).values = signal.values;
-    } else if (std::sscanf(line.c_str(), "BA_ \"E2EDataId\" BO_ %u %d;", &id, &data_id) == 2) {
-      out.at(id).data_id = data_id;
+    } else if (std::sscanf(line.c_str(), "BA_ \"%127[A-Za-z0-9]\" BO_ %u %d;", attribute.data(), &id,
+                           &number) == 3) {
+      set_attribute(attribute.data(), number, &out.at(id));
+    } else if (read_start_value(line.c_str(), &id, &name, &number)) {
+      out.at(id).signals.at(name).at_start = number;
     }
   }
   return out;

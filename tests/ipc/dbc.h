@@ -16,6 +16,7 @@ struct DbcSignal {
   double factor = 1, offset = 0, min = 0, max = 0;
   std::string unit;
   std::map<std::int64_t, std::string> values;
+  std::int64_t at_start = 0;
 
   [[nodiscard]] std::int64_t raw(const ipc::CanFrame& frame) const;
   // The physical value; NaN where the value table calls the raw value 'not available'.
@@ -25,9 +26,12 @@ struct DbcSignal {
 struct DbcMessage {
   std::string name;
   unsigned size = 0;
-  int data_id = -1;
+  int data_id = -1, e2e_profile = -1, cycle_ms = -1, timeout_ms = -1, frame_format = -1;
   std::map<std::string, DbcSignal> signals;
 };
+
+// The identifier as the file has it: bit 31 is set where it has 29 bits.
+[[nodiscard]] std::uint32_t dbc_id(const ipc::CanFrame& frame);
 
 // By identifier. Adds a test failure for a line it cannot read.
 std::map<std::uint32_t, DbcMessage> read_dbc(const std::string& path);

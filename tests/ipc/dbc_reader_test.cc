@@ -201,7 +201,7 @@ TEST_F(DbcText, MistakesAreNamed) {
 TEST(DbcShipped, IsRead) {
   const DbcSignal age =
       read_dbc_signal(test::source_dir() + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");
-  EXPECT_EQ(age.id, 0x300U);
+  EXPECT_EQ(age.id, 0x680U);
 }
 
 }  // namespace

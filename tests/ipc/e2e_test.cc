@@ -90,5 +90,40 @@ TEST(E2e, CheckerTellsLossAndRepetition) {
   EXPECT_EQ(checker.check(empty), E2eStatus::kWrongCrc);
 }
 
+TEST(E2eProfile5, Vector) {
+  CanFrame frame;
+  e2e5_protect(&frame, 0x1234, 0);
+  EXPECT_EQ(frame.data, (std::array<std::uint8_t, 64>{0x1c, 0xca, 0, 0, 0, 0, 0, 0}));
+}
+
+// A bit-by-bit CRC of its own, straight from the definition.
+std::uint16_t slow_crc5(const CanFrame& frame, std::uint16_t data_id) {
+  std::vector<unsigned> bytes(frame.data.begin() + 2, frame.data.begin() + frame.size);
+  bytes.push_back(data_id & 0xffU);
+  bytes.push_back(static_cast<unsigned>(data_id >> 8));
+  unsigned remainder = 0xffff;
+  for (const unsigned byte : bytes) {
+    for (int bit = 7; bit >= 0; --bit) {
+      const unsigned out = (remainder >> 15) ^ ((byte >> bit) & 1U);
+      remainder = (remainder << 1 & 0xffffU) ^ (out != 0 ? 0x1021U : 0U);
+    }
+  }
+  return static_cast<std::uint16_t>(remainder);
+}
+
+TEST(E2eProfile5, AgreesWithABitwiseCrcAndWritesItLowByteFirst) {
+  std::mt19937_64 rng(2);
+  for (int i = 0; i < 2000; ++i) {
+    CanFrame frame;
+    frame.size = 64;
+    for (auto& byte : frame.data) byte = static_cast<std::uint8_t>(rng());
+    const auto data_id = static_cast<std::uint16_t>(rng());
+    const auto counter = static_cast<std::uint8_t>(rng());
+    e2e5_protect(&frame, data_id, counter);
+    EXPECT_EQ(frame.data[2], counter);
+    EXPECT_EQ(frame.data[0] | frame.data[1] << 8, slow_crc5(frame, data_id));
+  }
+}
+
 }  // namespace
 }  // namespace farpoint::ipc

@@ -42,9 +42,10 @@ STAGES = "slam/stages.h"
 # The measurements that come in: the facade takes them, fusion turns them into factors.
 MEASUREMENTS = "slam/measurement.h"
 SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set(), MEASUREMENTS: {"slam/geometry"}}
-# The tools read camera files and refuse input as the daemon does, and speak with it.
-SHARED_WITH_TOOLS = {"daemon/config/errors.h", "daemon/config/yaml_file.h", "daemon/config/camera_file.h",
-                     "daemon/config/calibration_message.h", "daemon/system/control_socket.h"}
+# The tools read camera files and configurations and refuse input as the daemon does, and speak with it.
+SHARED_WITH_TOOLS = {"daemon/config/config.h", "daemon/config/errors.h", "daemon/config/yaml_file.h",
+                     "daemon/config/camera_file.h", "daemon/config/calibration_message.h",
+                     "daemon/system/control_socket.h"}
 SHARED_READERS = {"slam", "slam/map", "slam/solver", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.
 FORBIDDEN_IN_SLAM = re.compile(

@@ -11,6 +11,7 @@ using Action = std::function<int()>;
 
 void add_import_command(CLI::App* app, Action* action);
 void add_export_command(CLI::App* app, Action* action);
+void add_dbc_command(CLI::App* app, Action* action);
 void add_evaluate_command(CLI::App* app, Action* action);
 void add_bench_command(CLI::App* app, Action* action);
 void add_ctl_command(CLI::App* app, Action* action);

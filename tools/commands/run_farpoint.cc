@@ -56,6 +56,7 @@ int run_farpoint(int argc, const char* const* argv) {
   Action action;
   add_import_command(&app, &action);
   add_export_command(&app, &action);
+  add_dbc_command(&app, &action);
   add_evaluate_command(&app, &action);
   add_bench_command(&app, &action);
   add_ctl_command(&app, &action);

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "daemon/output/can_sink.h"
+#include "daemon/output/can_replay.h"
 #include "daemon/output/publisher.h"
 #include "tests/ipc/dbc.h"
 #include "tests/ipc/scratch.h"
@@ -48,15 +48,20 @@ std::vector<std::pair<std::int64_t, Epoch>> decode_can_log(const std::string& pa
     if (message == dbc.end()) continue;
     if (message->second.name == "FARPOINT_STATUS") epochs.emplace_back(parsed.utime, Epoch{});
     EXPECT_EQ(epochs.back().first, parsed.utime);
-    for (const auto& [name, signal] : message->second.signals)
+    for (const auto& [name, signal] : message->second.signals) {
+      // Of the counters that of the status frame.
+      if (name == "Counter" && message->second.name != "FARPOINT_STATUS") continue;
       epochs.back().second[name] = signal.value(parsed.frame);
+    }
   }
   return epochs;
 }
 
 std::string can_log_of(const std::string& path, const std::vector<FrameOutput>& frames,
                        CanPoseFrame pose_frame) {
-  CanSink sink(pose_frame);
+  EpochOptions options;
+  options.pose_frame = pose_frame;
+  CanReplay sink(ipc::CanLayout{}, options);
   sink.log_to(std::make_unique<ipc::CandumpWriter>(path, "can0"));
   for (const FrameOutput& frame : frames) sink.on_frame(frame);
   EXPECT_EQ(sink.errors(), 0);
@@ -64,15 +69,15 @@ std::string can_log_of(const std::string& path, const std::vector<FrameOutput>& 
   return path;
 }
 
-TEST(CanSink, ReceiverWithTheDbcGetsThePoseBackWithinAUnit) {
+TEST(CanReplay, ReceiverWithTheDbcGetsThePoseBackWithinAUnit) {
   const test::Scratch scratch;
   std::mt19937_64 random(1);
   std::vector<FrameOutput> frames;
   for (int i = 0; i < 200; ++i) frames.push_back(make_frame_output(result_at(i * 100'000, &random), 1.0));
   const auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kMap));
-  ASSERT_EQ(epochs.size(), frames.size());
+  ASSERT_EQ(epochs.size(), 5 * (frames.size() - 1) + 2);  // between the frames too, and the farewell
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    auto [utime, e] = epochs[i];
+    auto [utime, e] = epochs[5 * i];
     const slam::FrameResult& r = frames[i].result;
     ASSERT_EQ(utime, r.utime);
     EXPECT_NEAR(e["PositionX"], r.T_map_body.t.x(), 0.0051);
@@ -88,32 +93,30 @@ TEST(CanSink, ReceiverWithTheDbcGetsThePoseBackWithinAUnit) {
     EXPECT_EQ(e["ScaleState"], 1.0);
     EXPECT_EQ(e["PoseValid"], 1.0);
     EXPECT_EQ(e["State"], 3.0);
-    EXPECT_EQ(e["Quality"], 90.0);
+    EXPECT_EQ(e["BootCounter"], 0.0);
+    EXPECT_EQ(e["Predicted"], 0.0);
     EXPECT_EQ(e["Age"], 0.0);
-    EXPECT_NEAR(e["SigmaPositionX"], 0.01, 0.0011);
-    EXPECT_TRUE(std::isnan(e["SigmaVelocityX"]));
   }
 }
 
-TEST(CanSink, OdomFrameOnRequest) {
+TEST(CanReplay, OdomFrameOnRequest) {
   const test::Scratch scratch;
   std::mt19937_64 random(2);
   const FrameOutput frame = make_frame_output(result_at(0, &random), 1.0);
   auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), {frame}, CanPoseFrame::kOdom));
-  ASSERT_EQ(epochs.size(), 1u);
+  ASSERT_EQ(epochs.size(), 2u);
   EXPECT_NEAR(epochs[0].second["PositionX"], frame.result.T_odom_body.t.x(), 0.0051);
   EXPECT_EQ(epochs[0].second["Frame"], 0.0);
 }
 
-TEST(CanSink, WithoutAScalePositionAndVelocityAreNotAvailable) {
+TEST(CanReplay, WithoutAScalePositionAndVelocityAreNotAvailable) {
   const test::Scratch scratch;
   std::mt19937_64 random(3);
   const FrameOutput frame = make_frame_output(result_at(0, &random), 0.0);
   auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), {frame}, CanPoseFrame::kMap));
-  ASSERT_EQ(epochs.size(), 1u);
+  ASSERT_EQ(epochs.size(), 2u);
   Epoch& e = epochs[0].second;
-  for (const char* name : {"PositionX", "PositionY", "PositionZ", "VelocityX", "VelocityY", "VelocityZ",
-                           "SigmaPositionX", "SigmaPositionY", "SigmaPositionZ"}) {
+  for (const char* name : {"PositionX", "PositionY", "PositionZ", "VelocityX", "VelocityY", "VelocityZ"}) {
     EXPECT_TRUE(std::isnan(e[name])) << name;
   }
   EXPECT_FALSE(std::isnan(e["Heading"]));  // angles need no scale
@@ -121,7 +124,7 @@ TEST(CanSink, WithoutAScalePositionAndVelocityAreNotAvailable) {
   EXPECT_EQ(e["ScaleState"], 0.0);
 }
 
-TEST(CanSink, LossIsSaidInTheSameEpochAndLeavesNoNumber) {
+TEST(CanReplay, LossIsSaidInTheNextEpochAndLeavesNoNumber) {
   const test::Scratch scratch;
   std::mt19937_64 random(4);
   std::vector<FrameOutput> frames{make_frame_output(result_at(0, &random), 1.0)};
@@ -129,48 +132,60 @@ TEST(CanSink, LossIsSaidInTheSameEpochAndLeavesNoNumber) {
   lost.state = slam::State::kLost;
   frames.push_back(make_frame_output(lost, 1.0));
   auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kMap));
-  ASSERT_EQ(epochs.size(), 2u);
-  Epoch& e = epochs[1].second;
+  ASSERT_EQ(epochs.size(), 7u);
+  Epoch& e = epochs[5].second;
   EXPECT_EQ(e["State"], 5.0);
+  EXPECT_EQ(e["Reason"], 6.0);
   EXPECT_EQ(e["PoseValid"], 0.0);
-  for (const char* name : {"PositionX", "PositionZ", "Heading", "Roll", "Pitch", "VelocityX", "YawRate",
-                           "Quality", "SigmaPositionX", "SigmaHeading"}) {
+  for (const char* name : {"PositionX", "PositionZ", "Heading", "Roll", "Pitch", "VelocityX", "YawRate"}) {
     EXPECT_TRUE(std::isnan(e[name])) << name;
   }
 }
 
-// Spread of the decoded angles when the body's axes are disturbed by the covariance: the published sigmas
-// must match at attitudes far from level, where body axes and Euler angles differ most.
-TEST(CanSink, AnglesAndPositionsCarryTheirOwnSigmas) {
-  slam::FrameResult r;
-  r.state = slam::State::kTracking;
-  r.has_pose = true;
-  r.T_map_body = {slam::so3_exp({0.9, -0.7, 2.0}), {10.0, 20.0, 30.0}};
-  const Eigen::Vector<double, 6> sigmas{0.1, 0.02, 0.05, 0.01, 0.003, 0.006};
-  r.covariance = sigmas.cwiseAbs2().asDiagonal();
-  const ipc::OdometryEpoch epoch = make_epoch(make_frame_output(r, 1.0), CanPoseFrame::kMap, 0.0);
+TEST(CanReplay, TheClockIsTheRecordingsAndBridgesGaps) {
+  const test::Scratch scratch;
+  std::mt19937_64 random(8);
+  std::vector<FrameOutput> frames;
+  for (const std::int64_t utime : {0, 100'000, 200'000, 1'400'000})
+    frames.push_back(make_frame_output(result_at(utime, &random), 1.0));
+  auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kOdom));
+  ASSERT_EQ(epochs.size(), 72u);
+  for (std::size_t i = 0; i < epochs.size(); ++i) {
+    EXPECT_EQ(epochs[i].first, static_cast<std::int64_t>(20'000 * i));
+    EXPECT_EQ(epochs[i].second["Counter"], static_cast<double>(i % 15));
+  }
+  EXPECT_EQ(epochs[22].second["PoseValid"], 1.0);  // 0.24 s after the image
+  EXPECT_EQ(epochs[23].second["PoseValid"], 0.0);
+  EXPECT_EQ(epochs[23].second["State"], 5.0);
+  EXPECT_EQ(epochs[70].second["PoseValid"], 1.0);
+  EXPECT_EQ(epochs[71].second["State"], 8.0);
+  EXPECT_TRUE(std::isnan(epochs[71].second["Age"]));
+}
 
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
-  const int n = 20000;
-  Eigen::Matrix<double, 6, 1> sum_squares = Eigen::Matrix<double, 6, 1>::Zero();
-  for (int i = 0; i < n; ++i) {
-    slam::Vector6d delta;
-    for (int k = 0; k < 6; ++k) delta[k] = sigmas[k] * normal(random);
-    const slam::SE3 T = r.T_map_body.boxplus(delta);
-    const auto angles = ipc::euler_angles({T.q.w(), T.q.x(), T.q.y(), T.q.z()});
-    slam::Vector6d difference;
-    difference << T.t - r.T_map_body.t, angles.roll_rad - epoch.roll_rad, angles.pitch_rad - epoch.pitch_rad,
-        angles.heading_rad - epoch.heading_rad;
-    sum_squares += difference.cwiseAbs2();
+TEST(CanReplay, AFrameCountsFromWhenItWasThere) {
+  const test::Scratch scratch;
+  std::mt19937_64 random(9);
+  std::vector<FrameOutput> frames;
+  for (const std::int64_t utime : {0, 100'000, 200'000}) {
+    frames.push_back(make_frame_output(result_at(utime, &random), 1.0));
+    frames.back().age_us = 50'000;
   }
-  const slam::Vector6d measured = (sum_squares / n).cwiseSqrt();
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_NEAR(epoch.sigma_position_m[static_cast<std::size_t>(i)] / measured[i], 1.0, 0.03) << i;
+  auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kOdom));
+  ASSERT_EQ(epochs.size(), 12u);
+  for (std::size_t i = 0; i < 11; ++i) {
+    EXPECT_EQ(epochs[i].first, static_cast<std::int64_t>(50'000 + 20'000 * i));
+    EXPECT_NEAR(epochs[i].second["Age"], 0.05 + 0.02 * static_cast<double>(i % 5), 1e-9) << i;
   }
-  EXPECT_NEAR(epoch.sigma_roll_rad / measured[3], 1.0, 0.03);
-  EXPECT_NEAR(epoch.sigma_pitch_rad / measured[4], 1.0, 0.03);
-  EXPECT_NEAR(epoch.sigma_heading_rad / measured[5], 1.0, 0.03);
+}
+
+TEST(CanReplay, ATimeFarAwayIsNoGapToFill) {
+  const test::Scratch scratch;
+  std::mt19937_64 random(10);
+  std::vector<FrameOutput> frames;
+  for (const std::int64_t utime : {std::int64_t{0}, std::int64_t{1} << 50})
+    frames.push_back(make_frame_output(result_at(utime, &random), 1.0));
+  const auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kOdom));
+  EXPECT_EQ(epochs.size(), 2u);
 }
 
 TEST(Publisher, LogHoldsEveryMessageAtItsFramesTime) {

@@ -162,5 +162,55 @@ TEST_F(SocketCanPair, AFullQueueIsCountedAndSurvived) {
   EXPECT_TRUE(can_->send(frame));
 }
 
+TEST_F(SocketCanPair, AFrameIsInFlightUntilTheControllerConfirmsIt) {
+  CanOptions options;
+  options.confirm = true;
+  open(options);
+  const std::array<ipc::CanFrame, 2> frames{{{0x680, 8, {1}}, {0x681, 8, {2}}}};
+  EXPECT_TRUE(can_->send(frames));
+  EXPECT_EQ(can_->in_flight(), 2);
+  ipc::CanFrame frame;
+  std::int64_t age_us = 0;
+  EXPECT_FALSE(can_->take_confirmed(&frame, &age_us));
+  can_frame echo{};
+  ASSERT_EQ(read(bus_, &echo, sizeof echo), static_cast<ssize_t>(sizeof echo));
+  ASSERT_EQ(write(bus_, &echo, sizeof echo), static_cast<ssize_t>(sizeof echo));
+  ASSERT_TRUE(can_->take_confirmed(&frame, &age_us));
+  EXPECT_EQ(frame.id, 0x680U);
+  EXPECT_EQ(can_->in_flight(), 1);
+  EXPECT_EQ(can_->counts().confirmed, 1U);
+}
+
+// The kernel drops what it held: to wait for its confirmation would be to be silent for ever.
+TEST_F(SocketCanPair, AfterTheControllerStartedAnewNothingIsInFlight) {
+  CanOptions options;
+  options.confirm = true;
+  open(options);
+  const std::array<ipc::CanFrame, 1> frames{{{0x680, 8, {1}}}};
+  EXPECT_TRUE(can_->send(frames));
+  const auto tell = [&](std::uint32_t kinds) {
+    can_frame f{};
+    f.can_id = CAN_ERR_FLAG | kinds;
+    f.len = CAN_ERR_DLC;
+    ASSERT_EQ(write(bus_, &f, sizeof f), static_cast<ssize_t>(sizeof f));
+    ipc::CanFrame frame;
+    std::int64_t age_us = 0;
+    EXPECT_FALSE(can_->take_confirmed(&frame, &age_us));
+  };
+  tell(CAN_ERR_BUSOFF);
+  EXPECT_EQ(can_->in_flight(), 1);
+  tell(CAN_ERR_RESTARTED);
+  EXPECT_EQ(can_->in_flight(), 0);
+}
+
+TEST_F(SocketCanPair, IdentifiersOf29BitsAreSentAsSuch) {
+  std::array<ipc::CanFrame, 1> frames{{{0x18ff1000, 8, {1}}}};
+  frames[0].extended = true;
+  EXPECT_TRUE(can_->send(frames));
+  can_frame got{};
+  ASSERT_EQ(read(bus_, &got, sizeof got), static_cast<ssize_t>(sizeof got));
+  EXPECT_EQ(got.can_id, 0x18ff1000U | CAN_EFF_FLAG);
+}
+
 }  // namespace
 }  // namespace farpoint::drivers

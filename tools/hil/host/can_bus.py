@@ -6,10 +6,11 @@ import re
 
 MESSAGE = re.compile(r"^BO_ (\d+) (\w+): (\d+) \w+$")
 SIGNAL = re.compile(r"^ SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([^,]+),([^)]+)\)")
-DATA_ID = re.compile(r'^BA_ "E2EDataId" BO_ (\d+) (\d+);')
-STATUS = 0x300
+ATTRIBUTE = re.compile(r'^BA_ "(E2EDataId|E2EProfile|GenMsgCycleTime)" BO_ (\d+) (\d+);')
+EXTENDED = 1 << 31  # of an identifier of 29 bits in a DBC file
+STATE_STOPPED = 8
 LEAST_EPOCHS = 50
-NOT_TRACKING = {0, 1, 2, 5, 6, 7}
+NOT_TRACKING = {0, 1, 2, 5, 6, 7, 8}
 AGE_NOT_KNOWN = 65534  # and above: too old, or not available
 
 
@@ -18,6 +19,8 @@ class Message:
     name: str
     size: int
     data_id: int = 0
+    profile: int = 1
+    cycle_ms: int = 0
     signals: dict = dataclasses.field(default_factory=dict)
 
 
@@ -29,8 +32,9 @@ def layout(text):
             current = messages[int(found[1])] = Message(found[2], int(found[3]))
         elif found := SIGNAL.match(line):
             current.signals[found[1]] = (int(found[2]), int(found[3]), found[4] == "-", float(found[5]))
-        elif found := DATA_ID.match(line):
-            messages[int(found[1])].data_id = int(found[2])
+        elif found := ATTRIBUTE.match(line):
+            field = {"E2EDataId": "data_id", "E2EProfile": "profile", "GenMsgCycleTime": "cycle_ms"}[found[1]]
+            setattr(messages[int(found[2])], field, int(found[3]))
     return messages
 
 
@@ -58,9 +62,36 @@ def crc8(data_id, data):
 assert crc8(0x123, bytes(7)) == 0xCC  # the vector of the design
 
 
+def crc16(data_id, data):
+    """AUTOSAR E2E profile 5: polynomial 0x1021, start 0xFFFF, over the data and the Data ID's low and high byte."""
+    crc = 0xFFFF
+    for byte in (*data, data_id & 255, data_id >> 8):
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x1021 if crc & 0x8000 else 0)) & 0xFFFF
+    return crc
+
+
+assert crc16(0x1234, bytes(6)).to_bytes(2, "little") == bytes([0x1C, 0xCA])  # the vector of the profile
+
+
+def has_right_crc(message, data):
+    crc = crc16(message.data_id, data[2:]) if message.profile == 5 else crc8(message.data_id, data[1:])
+    return raw(message, "CRC", data) == crc
+
+
+def seal(message, data):
+    """Puts the right CRC into a frame."""
+    if message.profile == 5:
+        data[:2] = crc16(message.data_id, data[2:]).to_bytes(2, "little")
+    else:
+        data[0] = crc8(message.data_id, data[1:])
+    return data
+
+
 @dataclasses.dataclass
 class Epoch:
-    """Frames that share a counter."""
+    """The status frame and those that followed it."""
     time_s: float
     counter: int
     frames: dict
@@ -79,7 +110,8 @@ def frames_of(path):
     """(time, identifier, data) of what candump -L wrote; of CAN FD, ID##FLAGSDATA, as of classic frames, ID#DATA."""
     for time, frame in lines_of(path):
         identifier, data = frame.split("##" if "##" in frame else "#")
-        yield time, int(identifier, 16), bytes.fromhex(data[1:] if "##" in frame else data)
+        number = int(identifier, 16) | (EXTENDED if len(identifier) == 8 else 0)
+        yield time, number, bytes.fromhex(data[1:] if "##" in frame else data)
 
 
 def classic_frame(path):
@@ -90,6 +122,8 @@ def classic_frame(path):
 class Receiver:
     def __init__(self, messages):
         self.messages = messages
+        self.status = next(i for i, message in messages.items() if "State" in message.signals)
+        self.counters = 256 if messages[self.status].profile == 5 else 15
 
     def epochs(self, path):
         """(complaint or None, epochs): frames grouped as they came, each of known layout and right CRC."""
@@ -98,11 +132,10 @@ class Receiver:
             message = self.messages.get(identifier)
             if message is None or len(data) != message.size:
                 return f"a frame {identifier:X} of {len(data)} bytes is not in the DBC", []
-            if raw(message, "CRC", data) != crc8(message.data_id, data[1:]):
+            if not has_right_crc(message, data):
                 return f"wrong CRC of {message.name} at {time_s:.3f}", []
-            counter = raw(message, "Counter", data)
-            if identifier == STATUS or not found or found[-1].counter != counter:
-                found.append(Epoch(time_s, counter, {}))
+            if identifier == self.status or not found:
+                found.append(Epoch(time_s, raw(message, "Counter", data), {}))
             found[-1].frames[identifier] = data
         # The first and the last may be cut off.
         return None, found[1:-1]
@@ -125,22 +158,34 @@ class Receiver:
         complaint, age = self._ages(epochs, stamps_us, clocks_us)
         if complaint:
             return complaint, []
-        valid = sum(value(self.messages[STATUS], "PoseValid", e.frames[STATUS]) for e in epochs)
+        valid = sum(value(self.messages[self.status], "PoseValid", e.frames[self.status]) for e in epochs)
         if "valid" in expectations and valid < LEAST_EPOCHS:
             return f"only {valid:.0f} epochs with a valid pose", []
         return self._invalid_is_empty(epochs), [f"{len(epochs)} epochs, {valid:.0f} valid, {rate}, {age}"]
 
+    def _every(self, identifier):
+        """The frame goes out with every so many epochs."""
+        return round(self.messages[identifier].cycle_ms / self.messages[self.status].cycle_ms)
+
     def _complete(self, epochs):
+        always = {identifier for identifier in self.messages if self._every(identifier) == 1}
         for epoch in epochs:
-            if len(epoch.frames) != len(self.messages):
-                return f"{len(epoch.frames)} frames of the epoch at {epoch.time_s:.3f}, expected {len(self.messages)}"
+            if not always <= set(epoch.frames):
+                return f"{len(always & set(epoch.frames))} frames of the epoch at {epoch.time_s:.3f}, expected {len(always)}"
         return None
 
-    @staticmethod
-    def _counters(epochs):
-        for before, after in zip(epochs, epochs[1:]):
-            if after.counter != (before.counter + 1) % 15:
-                return f"counter {after.counter} after {before.counter} at {after.time_s:.3f}"
+    def _counters(self, epochs):
+        """Each frame counts by itself; those of every epoch with the status frame."""
+        last = {}
+        for epoch in epochs:
+            for identifier, data in epoch.frames.items():
+                counter = raw(self.messages[identifier], "Counter", data)
+                expected = (last.get(identifier, counter - 1) + 1) % self.counters
+                if counter != expected % self.counters:
+                    return f"counter {counter} after {last[identifier]} at {epoch.time_s:.3f}"
+                if self._every(identifier) == 1 and counter != epoch.counter:
+                    return f"counter {counter} in the epoch {epoch.counter} at {epoch.time_s:.3f}"
+                last[identifier] = counter
         return None
 
     @staticmethod
@@ -160,10 +205,10 @@ class Receiver:
         stamps_s = [1e-6 * (stamp - monotonic_us + real_us) for stamp in stamps_us]
         errors_s, images = [], set()
         for epoch in epochs:
-            data = epoch.frames[STATUS]
-            if raw(self.messages[STATUS], "Age", data) >= AGE_NOT_KNOWN:
+            data = epoch.frames[self.status]
+            if raw(self.messages[self.status], "Age", data) >= AGE_NOT_KNOWN:
                 continue
-            taken_s = epoch.time_s - value(self.messages[STATUS], "Age", data)
+            taken_s = epoch.time_s - value(self.messages[self.status], "Age", data)
             nearest = min(range(len(stamps_s)), key=lambda i: abs(stamps_s[i] - taken_s))
             errors_s.append(abs(stamps_s[nearest] - taken_s))
             images.add(nearest)
@@ -178,11 +223,11 @@ class Receiver:
         """Without a valid pose no position and no angle is sent."""
         attitude = next(i for i, m in self.messages.items() if "Heading" in m.signals)
         for epoch in epochs:
-            status = epoch.frames[STATUS]
-            valid = value(self.messages[STATUS], "PoseValid", status)
+            status = epoch.frames[self.status]
+            valid = value(self.messages[self.status], "PoseValid", status)
             not_available = raw(self.messages[attitude], "Heading", epoch.frames[attitude]) == 0x8000
             if not valid and not not_available:
                 return f"a heading without a valid pose at {epoch.time_s:.3f}"
-            if valid and raw(self.messages[STATUS], "State", status) in NOT_TRACKING:
+            if valid and raw(self.messages[self.status], "State", status) in NOT_TRACKING:
                 return f"a valid pose in a state that has none at {epoch.time_s:.3f}"
         return None

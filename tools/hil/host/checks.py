@@ -231,8 +231,9 @@ def schedule(folder, stock, log, output, least):
 
 
 def bus(folder, stock, log, of, rate_hz, *expectations):
-    """Decodes a bus by the DBC alone."""
-    text = (stock.here.parents[1] / "config/farpoint.dbc").read_text()
+    """Decodes a bus by the DBC alone: that of the scenario's configuration, where it has one of its own."""
+    own = folder / "mine.dbc"
+    text = (own if own.exists() else stock.here.parents[1] / "config/farpoint.dbc").read_text()
     clocks, frames = played(folder / of)
     receiver = can_bus.Receiver(can_bus.layout(text))
     return receiver.check(folder / log, [stamp for _, stamp in frames], clocks, float(rate_hz), expectations)

@@ -1,0 +1,85 @@
+// Odometry on the bus, by the steady clock: an epoch at the configured rate, whatever happens to images.
+//
+// At most one epoch is in flight. Its status frame goes out first; the others follow when the controller has
+// confirmed it. Where the bus takes nothing, epochs are left out and counted, so that only the frame that was
+// in flight can come out late. The DBC tells receivers to reject what does not follow its status frame.
+#pragma once
+
+#include <limits>
+#include <memory>
+
+#include "daemon/output/epoch_predictor.h"
+#include "drivers/can/socketcan.h"
+#include "ipc/can_codec.h"
+#include "ipc/candump.h"
+#include "slam/spsc_ring.h"
+
+namespace farpoint::daemon {
+
+class CanBus final : public PoseSink {
+ public:
+  static constexpr double kNever_s = std::numeric_limits<double>::infinity();
+
+  CanBus(const ipc::CanLayout& layout, const EpochOptions& options);
+  // Says farewell where the caller has not.
+  ~CanBus() override;
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+
+  // Before the first tick. Without a bus the epochs go into the log alone.
+  void send_on(std::unique_ptr<drivers::SocketCan> bus) { bus_ = std::move(bus); }
+  // The log gets what the controller confirmed, with the time at which it did.
+  void log_to(std::unique_ptr<ipc::CandumpWriter> log) { log_ = std::move(log); }
+  void set_body_is_camera(bool is_camera) { predictor_.set_body_is_camera(is_camera); }
+
+  // Output thread, which never waits here.
+  void on_frame(const FrameOutput& frame) override;
+  // Sends what is due, takes confirmations, and looks for a bus that is away.
+  void tick(double now_s);
+  // When tick() has to be called next; the steady clock.
+  [[nodiscard]] double next_due_s() const;
+
+  // Calling thread: moves what was confirmed into the log.
+  void write_log();
+  // Calling thread, after the output thread has ended: sends the last epoch. Waits up to 0.3 s for the bus.
+  void farewell();
+  // Puts the log in its place. Throws std::runtime_error where something was not stored.
+  void close();
+
+  // Frames that did not reach the bus.
+  [[nodiscard]] std::int64_t errors() const;
+  [[nodiscard]] drivers::CanState bus_state() const {
+    return bus_ ? bus_->state() : drivers::CanState::kUnknown;
+  }
+  [[nodiscard]] drivers::CanCounts bus_counts() const { return bus_ ? bus_->counts() : drivers::CanCounts{}; }
+
+ private:
+  struct Logged {
+    std::int64_t utime = 0;
+    ipc::CanFrame frame;
+  };
+  static constexpr std::size_t kLogged = 4096;  // frames that the log may be behind, nine seconds
+
+  void maintain(double now_s);
+  void take_confirmations(double now_s);
+  void begin_epoch(double now_s);
+  void send_next(double now_s);
+  void leave_rest_out();
+  [[nodiscard]] bool waits_for_confirmation() const;
+  void note(const ipc::CanFrame& frame, double now_s, std::int64_t age_us);
+  bool settle(double limit_s);
+
+  EpochPredictor predictor_;
+  ipc::CanEncoder encoder_;
+  const double period_s_;
+  std::unique_ptr<drivers::SocketCan> bus_;
+  std::unique_ptr<ipc::CandumpWriter> log_;
+  slam::SpscRing<Logged> logged_;
+  ipc::CanEpoch epoch_;   // being sent
+  std::size_t sent_ = 0;  // of its frames
+  double next_epoch_s_ = 0, next_maintenance_s_ = 0, look_s_ = kNever_s;
+  std::int64_t left_out_ = 0;  // frames
+  bool said_farewell_ = false;
+};
+
+}  // namespace farpoint::daemon
