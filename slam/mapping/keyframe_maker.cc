@@ -20,7 +20,7 @@ void unproject_features(const Camera& camera, const FeatureSet& set, std::vector
 }  // namespace
 
 KeyframeHandle KeyframeMaker::make(const Frame& frame, const SE3& T_world_body, std::int32_t map_id) {
-  Keyframe k = map_.roomy_keyframe();
+  Keyframe k = map_.preallocated_keyframe();
   k.map_id = map_id;
   k.utime = frame.utime;
   k.frame_number = frame.number;
