@@ -11,17 +11,18 @@ namespace farpoint::slam {
 
 namespace {
 
-Rig usable_rig(const Rig& rig) {
+void check_rig(const Rig& rig) {
   if (rig.cameras.empty())
     throw std::invalid_argument("rig: no camera; at least one calibrated camera is needed");
-  Rig out = rig;
-  for (const RigCamera& c : out.cameras)
+  for (const RigCamera& c : rig.cameras)
     if (const std::string why = Camera::check(c.camera.parameters()); !why.empty())
       throw std::invalid_argument("camera '" + c.name + "': " + why);
-  // The lever arm is in metres and the map is not (config.h).
-  const Eigen::Vector3d origin = out.cameras.front().T_body_camera.t;
-  for (RigCamera& c : out.cameras) c.T_body_camera.t -= origin;
-  return out;
+}
+
+// The map has no metric scale.
+Rig usable_rig(const Rig& rig) {
+  check_rig(rig);
+  return with_body_at_camera(rig, 0);
 }
 
 }  // namespace

@@ -16,16 +16,24 @@ constexpr int kGridCell_px = 24;
 // keyframe.
 constexpr std::size_t kFrames = 2 * Initialiser::kHistoryFrames + 8;
 
-std::shared_ptr<Frame> full_frame(const Camera& camera, const EstimatorConfig& config) {
-  const auto features = static_cast<std::size_t>(config.extractor.features);
-  auto frame = std::make_shared<Frame>();
+FrameView full_view(const Camera& camera, std::size_t features) {
+  FrameView view;
   // Filled once, so that all its memory is touched.
-  frame->set.features.resize(features);
-  frame->set.descriptors.resize(features);
-  frame->grid = FeatureGrid(camera.width_px(), camera.height_px(), kGridCell_px, features);
-  frame->grid.build(frame->set.features);
-  frame->set.features.clear();
-  frame->set.descriptors.clear();
+  view.set.features.resize(features);
+  view.set.descriptors.resize(features);
+  view.grid = FeatureGrid(camera.width_px(), camera.height_px(), kGridCell_px, features);
+  view.grid.build(view.set.features);
+  view.set.features.clear();
+  view.set.descriptors.clear();
+  return view;
+}
+
+std::shared_ptr<Frame> full_frame(const Rig& rig, int cameras, const EstimatorConfig& config) {
+  auto frame = std::make_shared<Frame>();
+  frame->views = PerCamera<FrameView>(cameras);
+  for (int c = 0; c < cameras; ++c)
+    frame->views[c] = full_view(rig.cameras[static_cast<std::size_t>(c)].camera,
+                                static_cast<std::size_t>(config.extractor.features));
   return frame;
 }
 
@@ -76,17 +84,38 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
   PyramidImage image;
 };
 
-FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig)
-    : config_(config),
-      camera_(rig.cameras.front().camera),
-      extractor_(camera_.width_px(), camera_.height_px(), config_.pyramid, config_.extractor),
-      frames_(kFrames, [this] { return full_frame(camera_, config_); }),
-      pyramids_(pyramid_count(config_), [this] {
-        return std::make_shared<PyramidBuffer>(camera_.width_px(), camera_.height_px(), config_.pyramid);
-      }) {}
+struct FrameIntake::CameraIntake {
+  CameraIntake(const Camera& model, const EstimatorConfig& config)
+      : camera(model),
+        extractor(model.width_px(), model.height_px(), config.pyramid, config.extractor),
+        pyramids(pyramid_count(config), [&model, &config] {
+          return std::make_shared<PyramidBuffer>(model.width_px(), model.height_px(), config.pyramid);
+        }) {}
 
-bool FrameIntake::is_acceptable(std::int64_t utime, int camera) {
-  if (camera != 0 || (any_frame_ && utime <= utime_)) return false;
+  Camera camera;
+  Extractor extractor;
+  SharedPool<PyramidBuffer> pyramids;
+  std::uint64_t image_hash = 0;  // of the last image
+};
+
+FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras) : config_(config) {
+  cameras_.reserve(static_cast<std::size_t>(cameras));
+  for (int c = 0; c < cameras; ++c)
+    cameras_.push_back(
+        std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)].camera, config_));
+  frames_ = SharedPool<Frame>(kFrames, [&] { return full_frame(rig, cameras, config_); });
+}
+
+FrameIntake::~FrameIntake() = default;
+
+bool FrameIntake::takes(const CameraImage& image) const {
+  if (!takes(image.camera) || image.image.data == nullptr) return false;
+  const Camera& camera = cameras_[static_cast<std::size_t>(image.camera)]->camera;
+  return image.image.width_px == camera.width_px() && image.image.height_px == camera.height_px();
+}
+
+bool FrameIntake::advance(std::int64_t utime) {
+  if (any_frame_ && utime <= utime_) return false;
   any_frame_ = true;
   utime_ = utime;
   return true;
@@ -95,64 +124,79 @@ bool FrameIntake::is_acceptable(std::int64_t utime, int camera) {
 template <typename Input>
 std::shared_ptr<Frame> FrameIntake::take_frame(const Input& input) {
   // Frames that were given back still name their pixels.
-  frames_.for_each_idle([](Frame& frame) { frame.image.reset(); });
+  frames_.for_each_idle([](Frame& frame) { frame.drop_pixels(); });
   std::shared_ptr<Frame> frame = frames_.take();
   if (!frame) return frame;
   frame->number = next_number_++;
   frame->utime = input.utime;
   frame->sequence = input.sequence;
-  frame->camera = input.camera;
+  for (int c = 0; c < frame->views.size(); ++c) {
+    FrameView& view = frame->views[c];
+    view.set.features.clear();
+    view.set.descriptors.clear();
+    view.grid.build(view.set.features);
+  }
   return frame;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(const FrameInput& input) {
-  const bool fits = input.image.data != nullptr && input.image.width_px == camera_.width_px() &&
-                    input.image.height_px == camera_.height_px();
-  if (!fits || !is_acceptable(input.utime, input.camera)) return {};
+  const CameraImage first{input.camera, input.image};
+  const bool takes_others = std::all_of(input.others.begin(), input.others.end(),
+                                        [this](const CameraImage& image) { return takes(image); });
+  if (!takes(first) || !takes_others || !advance(input.utime)) return {};
   std::shared_ptr<Frame> frame = take_frame(input);
-  const std::shared_ptr<PyramidBuffer> pixels = pyramids_.take();
-  if (!frame || !pixels) return {};
+  if (!frame || !fill_view(first, input.most_features, frame.get())) return {};
+  for (const CameraImage& other : input.others)
+    if (!fill_view(other, input.most_features, frame.get())) return {};
+  return frame;
+}
+
+// False where no pixels are free.
+bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* frame) {
+  CameraIntake& camera = *cameras_[static_cast<std::size_t>(input.camera)];
+  const std::shared_ptr<PyramidBuffer> pixels = camera.pyramids.take();
+  if (!pixels) return false;
   const std::uint64_t hash = pixel_hash(input.image);
-  if (std::exchange(image_hash_, hash) == hash) {
-    frame->set.features.clear();
-    frame->set.descriptors.clear();
-    frame->grid.build(frame->set.features);
-    return frame;
-  }
+  if (std::exchange(camera.image_hash, hash) == hash) return true;
+  FrameView& view = frame->views[input.camera];
   {
     const StageSpan span(listener_, Stage::kPyramid);
     pixels->pyramid.build(input.image);
   }
-  {
-    const StageSpan span(listener_, Stage::kExtraction);
-    extractor_.extract(pixels->pyramid, {}, &frame->set, input.most_features);
-    frame->image = pixels;
-    frame->grid.build(frame->set.features);
-  }
-  return frame;
+  const StageSpan span(listener_, Stage::kExtraction);
+  camera.extractor.extract(pixels->pyramid, {}, &view.set, most_features);
+  view.image = pixels;
+  view.grid.build(view.set.features);
+  return true;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(FeatureInput&& input) {
-  if (!is_acceptable(input.utime, input.camera)) return {};
+  if (!takes(input.camera) || !advance(input.utime)) return {};
   std::shared_ptr<Frame> frame = take_frame(input);
   if (!frame) return {};
-  frame->set = std::move(input.features);
-  frame->image = std::move(input.image);
-  frame->grid.build(frame->set.features);
+  FrameView& view = frame->views[input.camera];
+  view.set = std::move(input.features);
+  view.image = std::move(input.image);
+  view.grid.build(view.set.features);
   return frame;
 }
 
 void FrameIntake::release() {
   frames_ = {};
-  pyramids_ = {};
+  for (const auto& camera : cameras_) camera->pyramids = {};
 }
 
 std::vector<std::pair<std::string, std::size_t>> FrameIntake::memory_table() const {
   const Frame& frame = frames_.sample();
-  const std::size_t frame_bytes = sizeof(Frame) + frame.set.features.capacity() * sizeof(Feature) +
-                                  frame.set.descriptors.capacity() * sizeof(Descriptor) + frame.grid.bytes();
-  return {{"pyramids", pyramids_.capacity() * pyramids_.sample().pyramid.bytes()},
-          {"frames", frames_.capacity() * frame_bytes}};
+  std::size_t frame_bytes = sizeof(Frame), pyramid_bytes = 0;
+  for (int c = 0; c < frame.views.size(); ++c) {
+    const FrameView& view = frame.views[c];
+    frame_bytes += view.set.features.capacity() * sizeof(Feature) +
+                   view.set.descriptors.capacity() * sizeof(Descriptor) + view.grid.bytes();
+  }
+  for (const auto& camera : cameras_)
+    pyramid_bytes += camera->pyramids.capacity() * camera->pyramids.sample().pyramid.bytes();
+  return {{"pyramids", pyramid_bytes}, {"frames", frames_.capacity() * frame_bytes}};
 }
 
 }  // namespace farpoint::slam

@@ -20,12 +20,16 @@ namespace farpoint::slam {
 
 class FrameIntake {
  public:
-  FrameIntake(const EstimatorConfig& config, const Rig& rig);
+  // Takes images of the first `cameras` cameras of the rig.
+  FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras = 1);
+  ~FrameIntake();
+  FrameIntake(const FrameIntake&) = delete;
+  FrameIntake& operator=(const FrameIntake&) = delete;
   void listen(StageListener* listener) { listener_ = listener; }
 
-  // Null where the frame cannot be used: wrong size, not camera 0, a time not after the last frame's, or no
-  // room. An image with the pixels of the one before gives a frame without features: a camera that hangs
-  // shows nothing of the present.
+  // Null where the frame cannot be used: wrong size, a camera whose images are not taken, a time not after
+  // the last frame's, or no room. An image with the pixels of the one before gives a view without features: a
+  // camera that hangs shows nothing of the present.
   [[nodiscard]] std::shared_ptr<Frame> take(const FrameInput& input);
   [[nodiscard]] std::shared_ptr<Frame> take(FeatureInput&& input);
 
@@ -40,21 +44,27 @@ class FrameIntake {
  private:
   struct PyramidBuffer;
 
-  [[nodiscard]] bool is_acceptable(std::int64_t utime, int camera);
+  // One camera's extractor and pixels.
+  struct CameraIntake;
+
+  [[nodiscard]] bool takes(int camera) const {
+    return camera >= 0 && camera < static_cast<int>(cameras_.size());
+  }
+  [[nodiscard]] bool takes(const CameraImage& image) const;
+  // Notes the time of a frame. False where it is not after the last frame's.
+  [[nodiscard]] bool advance(std::int64_t utime);
+  [[nodiscard]] bool fill_view(const CameraImage& image, int most_features, Frame* frame);
   template <typename Input>
   [[nodiscard]] std::shared_ptr<Frame> take_frame(const Input& input);
 
   const EstimatorConfig config_;
-  const Camera camera_;
-  Extractor extractor_;
+  std::vector<std::unique_ptr<CameraIntake>> cameras_;  // by camera
   SharedPool<Frame> frames_;
-  SharedPool<PyramidBuffer> pyramids_;
   StageListener* listener_ = nullptr;
 
   std::uint64_t next_number_ = 0;
   std::int64_t utime_ = 0;
   bool any_frame_ = false;
-  std::uint64_t image_hash_ = 0;  // of the last image
 };
 
 }  // namespace farpoint::slam

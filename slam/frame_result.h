@@ -1,8 +1,9 @@
-// What goes into the estimator for one frame, and what it knows after it.
+// Input and result of the estimator for one frame.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "slam/geometry/se3.h"
 #include "slam/image/extractor.h"
@@ -29,6 +30,13 @@ enum class State : std::uint8_t {
 enum class ScaleState : std::uint8_t { kUnknown = 0, kAssumed = 1, kMetric = 2 };
 
 // One image of one camera.
+// An image of one camera of the rig.
+struct CameraImage {
+  int camera = 0;
+  ImageView image;
+};
+
+// `others`: images of further cameras, exposed at the same time; valid during the call.
 struct FrameInput {
   std::int64_t utime = 0;  // mid-exposure, microseconds
   std::int64_t sequence = 0;
@@ -36,6 +44,7 @@ struct FrameInput {
   ImageView image;
   // Features extracted at most; fewer than configured where time is short.
   int most_features = Extractor::kAllFeatures;
+  std::span<const CameraImage> others = {};
 };
 
 // Features measured elsewhere, by a simulator of features. The estimator shares `image` while it uses the
@@ -56,7 +65,7 @@ struct FrameTaken {
   std::uint64_t wheels = 0;   // samples, late ones included
 };
 
-// What is known after one frame. Map units are metres only where `scale` says so.
+// The estimate after one frame. Map units are metres only with `scale` metric or assumed.
 struct FrameResult {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;

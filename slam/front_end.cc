@@ -59,7 +59,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   result_ = FrameResult{};
   result_.utime = frame->utime;
   result_.sequence = frame->sequence;
-  result_.features = static_cast<int>(frame->set.features.size());
+  result_.features = static_cast<int>(frame->feature_count());
   take_samples(*frame, limit.up_to);
   take_replies(frame->number, {limit.replies_by_delay, limit.up_to.replies});
   const bool blind = result_.features < config_.tracking.min_inliers;
@@ -139,7 +139,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });
-  for (const auto& f : waiting_) f->image.reset();
+  for (const auto& f : waiting_) f->drop_pixels();
   record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
   record(
       {second.utime, map_id_, view.reference_id, view.T_world_reference.inverse() * view.T_world_reference});

@@ -60,7 +60,8 @@ void Inspection::visit_observation_distances(const std::function<void(std::int32
     if (l.state == LandmarkState::kBearing || l.inverse_depth <= 0.0) return;
     const Eigen::Vector4d p = map.world_point(l);
     for (const Observation& o : l.observations)
-      visit(l.map_id, (p.head<3>() / p[3] - map.T_world_camera(map.keyframes()[o.keyframe]).t).norm());
+      visit(l.map_id,
+            (p.head<3>() / p[3] - map.T_world_camera(map.keyframes()[o.keyframe], o.camera).t).norm());
   });
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "slam/config.h"
-#include "slam/map/frame.h"
+#include "slam/map/request.h"
 #include "slam/map/local_view.h"
 #include "slam/mapping/counts.h"
 #include "slam/spsc_ring.h"

@@ -10,7 +10,7 @@ namespace {
 // A map is given up after more frames and more time than these. Frames that show nothing do not count.
 constexpr int kRelocalisationFrames = 15;
 constexpr std::int64_t kRelocalisation_us = 1'500'000;
-// After so many missing frames in a row, constant velocity is no prior any more.
+// Missing frames in a row after which constant velocity is not used as a prior.
 constexpr int kGapFrames = 4;
 // A map with fewer keyframes is discarded, not retired, when it is lost: its unit has not settled.
 constexpr int kYoungMapKeyframes = 5;

@@ -19,7 +19,7 @@ struct EpochOptions {
 // Times are in microseconds of one clock: the steady clock live, the recording's in replay.
 class EpochPredictor {
  public:
-  // A pose that is older by its image is not valid: nobody measures where the body went since.
+  // A pose that is older by its image is not valid: no sensor has measured the motion since.
   static constexpr std::int64_t kLongest_us = 250'000;
 
   explicit EpochPredictor(const EpochOptions& options) : options_(options) {}

@@ -132,7 +132,7 @@ void Outputs::open_bus(const Config& config) {
   options.extended_ids = layout.extended;
   for (std::size_t i = 0; i < (layout.fd ? 1 : ipc::kCanMessages); ++i)
     options.sent_ids.push_back(layout.id(static_cast<ipc::CanMessage>(i)));
-  // Lockstep waits for nobody.
+  // Lockstep never waits for the bus.
   const bool steady = live || options_.speed;
   options.confirm = steady;
   const std::string name = bus_name(config);

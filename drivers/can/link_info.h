@@ -15,7 +15,7 @@ struct LinkInfo {
 // By netlink. None where there is no such interface or no netlink.
 [[nodiscard]] std::optional<LinkInfo> read_link(const std::string& interface);
 
-// Why the queue does not fit epochs of so many frames, empty where it does.
+// The reason why the queue does not fit epochs of `frames` frames; empty where it fits.
 [[nodiscard]] std::string queue_problem(const LinkInfo& link, std::size_t frames);
 
 }  // namespace farpoint::drivers

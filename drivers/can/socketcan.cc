@@ -281,7 +281,7 @@ bool SocketCan::read_frame(canfd_frame* frame, std::int64_t* age_us, bool* own) 
       if (error != EAGAIN) note_link(error);
       return false;
     }
-    // A confirmation may be among what was lost: to wait for it would be to wait for ever.
+    // The confirmation may be among the lost frames, and would then never arrive.
     if (arrival.overflows != overflows_) in_flight_ = 0;
     overflows_ = arrival.overflows;
     if ((frame->can_id & CAN_ERR_FLAG) != 0) {

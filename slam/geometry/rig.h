@@ -1,6 +1,7 @@
 // The cameras on the body and where each of them stands.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,18 @@ struct RigCamera {
   SE3 T_body_camera;
 };
 
-// All cameras of one body. A map of unknown scale cannot express the lever arm between body and camera
-// (metres) in its units: the body then stands at camera 0 with the body's axes.
+// All cameras of one body.
 struct Rig {
   std::vector<RigCamera> cameras;
 };
+
+// The rig with its body moved to the centre of camera `index`; the body's axes stay. For maps of unknown
+// scale: the lever arm between body and camera is in metres, which such a map cannot express in its units.
+// What is published as the body is then this camera's centre. A metric map keeps the rig as it is.
+[[nodiscard]] inline Rig with_body_at_camera(Rig rig, std::size_t index) {
+  const Eigen::Vector3d centre = rig.cameras[index].T_body_camera.t;
+  for (RigCamera& c : rig.cameras) c.T_body_camera.t -= centre;
+  return rig;
+}
 
 }  // namespace farpoint::slam

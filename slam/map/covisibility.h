@@ -41,7 +41,8 @@ class Covisibility {
   struct Shared {
     int all = 0, wide = 0;
   };
-  void count_shared(const Keyframe& keyframe);
+  void count_shared(KeyframeHandle keyframe);
+  void count_observers(const Landmark& landmark);
   // Order of a list: most wide landmarks, then most landmarks, then newest.
   [[nodiscard]] bool stronger(const Covisible& a, const Covisible& b) const;
 

@@ -1,61 +1,42 @@
-// What tracking hands to mapping: frames, sightings, keyframe requests, the pair a map starts from.
+// A frame: what the cameras of the rig show at one time.
 #pragma once
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
-#include "slam/geometry/se3.h"
 #include "slam/image/feature_grid.h"
-#include "slam/map/landmark.h"
+#include "slam/map/per_camera.h"
 
 namespace farpoint::slam {
+
+// Of one camera. Without features where that camera gave no image.
+struct FrameView {
+  FeatureSet set;
+  FeatureGrid grid;
+  std::shared_ptr<const FrameImage> image;  // null: pixels not kept, or no image
+};
 
 struct Frame {
   std::uint64_t number = 0;  // counts processed frames, from 0
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
-  int camera = 0;
-  FeatureSet set;
-  FeatureGrid grid;
-  std::shared_ptr<const FrameImage> image;
-};
+  PerCamera<FrameView> views;
 
-// A landmark found in a frame.
-struct Sighting {
-  LandmarkHandle landmark;
-  std::int32_t feature = -1;
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
-  float sigma_px = 1.0F;
-};
-
-// How often a landmark should have been, and was, seen since the last keyframe.
-struct SightingCount {
-  LandmarkHandle landmark;
-  std::uint16_t visible = 0, found = 0;
-};
-
-// A frame that tracking wants remembered. The pose is relative to a keyframe, so that it stays right when
-// mapping moves that keyframe in the meantime.
-struct KeyframeRequest {
-  std::shared_ptr<Frame> frame;
-  std::int32_t map_id = 0;
-  std::uint64_t reference_id = 0;
-  SE3 T_reference_body;
-  std::vector<Sighting> sightings;
-  std::vector<SightingCount> counts;
-};
-
-struct InitialPoint {
-  std::size_t feature_first = 0, feature_second = 0;
-  double inverse_depth = 0;  // along the bearing in the first camera, 1 / baseline
-};
-
-// Two frames with known relative motion.
-struct InitialPair {
-  std::shared_ptr<Frame> first, second;
-  SE3 T_first_second;  // bodies, unit baseline
-  std::vector<InitialPoint> points;
+  // Some camera's pixels are there.
+  [[nodiscard]] bool has_pixels() const {
+    for (int c = 0; c < views.size(); ++c)
+      if (views[c].image != nullptr) return true;
+    return false;
+  }
+  void drop_pixels() {
+    for (int c = 0; c < views.size(); ++c) views[c].image.reset();
+  }
+  // Of all cameras.
+  [[nodiscard]] std::size_t feature_count() const {
+    std::size_t count = 0;
+    for (int c = 0; c < views.size(); ++c) count += views[c].set.features.size();
+    return count;
+  }
 };
 
 }  // namespace farpoint::slam

@@ -1,4 +1,4 @@
-// A remembered frame.
+// A keyframe: a frame that the map keeps.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 
 #include "slam/image/feature_grid.h"
 #include "slam/map/landmark.h"
+#include "slam/map/per_camera.h"
 
 namespace farpoint::slam {
 
@@ -16,25 +17,37 @@ struct Covisible {
   int wide = 0;    // of these, seen under an angle that shows translation
 };
 
-struct Keyframe {
-  std::uint64_t id = 0;  // ascending over the whole run
-  std::int32_t map_id = 0;
-  std::int64_t utime = 0;
-  std::uint64_t frame_number = 0;
-  int camera = 0;
-  SE3 T_world_body;
-
+// What one camera showed. Empty where that camera gave no image.
+struct KeyframeView {
   std::vector<LandmarkHandle> landmarks;  // one a feature; null: none. Thinned: one an observation
   // For the search for new landmarks, while the keyframe is recent (CapacityConfig::window_images):
   FeatureSet set;
   std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
   FeatureGrid grid;
-  std::shared_ptr<const FrameImage> image;  // pixels for alignment
+  std::shared_ptr<const FrameImage> image;  // pixels for alignment; null: thinned, or no image
 
-  // Most wide ones first: keyframes that share only what is far say little about each other's place. Then
-  // most shared, then newest.
+  [[nodiscard]] bool has_pixels() const { return image != nullptr; }
+};
+
+struct Keyframe {
+  std::uint64_t id = 0;  // ascending over the whole run
+  std::int64_t utime = 0;
+  std::uint64_t frame_number = 0;
+  std::int32_t map_id = 0;
+  std::uint32_t optimised = 0;  // times local BA moved it
+  SE3 T_world_body;
+  PerCamera<KeyframeView> views;
+
+  // Most wide ones first: keyframes that share only distant landmarks say little about each other's place.
+  // Then most shared, then newest.
   std::vector<Covisible> covisible;
-  std::uint64_t optimised = 0;  // times local BA moved it
+
+  // Some camera's pixels are still there.
+  [[nodiscard]] bool has_pixels() const {
+    for (int c = 0; c < views.size(); ++c)
+      if (views[c].has_pixels()) return true;
+    return false;
+  }
 };
 
 }  // namespace farpoint::slam

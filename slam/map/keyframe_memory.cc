@@ -17,13 +17,13 @@ void preallocate(std::size_t size, std::vector<T>* array) {
   array->clear();
 }
 
-Keyframe preallocated_keyframe(std::size_t features) {
-  Keyframe keyframe;
-  preallocate(features, &keyframe.set.features);
-  preallocate(features, &keyframe.set.descriptors);
-  preallocate(features, &keyframe.landmarks);
-  preallocate(features, &keyframe.bearings);
-  return keyframe;
+KeyframeView preallocated_view(std::size_t features) {
+  KeyframeView view;
+  preallocate(features, &view.set.features);
+  preallocate(features, &view.set.descriptors);
+  preallocate(features, &view.landmarks);
+  preallocate(features, &view.bearings);
+  return view;
 }
 
 }  // namespace
@@ -32,24 +32,24 @@ KeyframeMemory::KeyframeMemory(const KeyframeMemoryOptions& options)
     : thinned_capacity_(options.features / kThinnedShare) {
   if (options.features == 0) return;
   for (std::size_t i = 0; i < options.with_pixels; ++i)
-    spare_keyframes_.push_back(preallocated_keyframe(options.features));
+    spare_views_.push_back(preallocated_view(options.features));
   spare_lists_.resize(options.thinned);
   for (auto& list : spare_lists_) preallocate(thinned_capacity_, &list);
 }
 
-Keyframe KeyframeMemory::take() {
-  if (spare_keyframes_.empty()) return {};
-  Keyframe keyframe = std::move(spare_keyframes_.back());
-  spare_keyframes_.pop_back();
-  return keyframe;
+KeyframeView KeyframeMemory::take() {
+  if (spare_views_.empty()) return {};
+  KeyframeView view = std::move(spare_views_.back());
+  spare_views_.pop_back();
+  return view;
 }
 
-void KeyframeMemory::give_back(Keyframe* keyframe) {
-  Keyframe& spare = spare_keyframes_.emplace_back();
-  spare.set = std::move(keyframe->set);
-  spare.landmarks = std::move(keyframe->landmarks);
-  spare.bearings = std::move(keyframe->bearings);
-  spare.grid = std::move(keyframe->grid);
+void KeyframeMemory::give_back(KeyframeView* view) {
+  KeyframeView& spare = spare_views_.emplace_back();
+  spare.set = std::move(view->set);
+  spare.landmarks = std::move(view->landmarks);
+  spare.bearings = std::move(view->bearings);
+  spare.grid = std::move(view->grid);
 }
 
 std::vector<LandmarkHandle> KeyframeMemory::take_thinned(std::size_t landmarks) {
@@ -70,15 +70,16 @@ void KeyframeMemory::give_back_thinned(std::vector<LandmarkHandle>&& landmarks) 
     spare_lists_.push_back(std::move(landmarks));
 }
 
-std::size_t KeyframeMemory::array_bytes(const Keyframe& k) {
-  return k.set.features.capacity() * sizeof(Feature) + k.set.descriptors.capacity() * sizeof(Descriptor) +
-         k.landmarks.capacity() * sizeof(LandmarkHandle) + k.bearings.capacity() * sizeof(Eigen::Vector3f) +
-         k.grid.bytes();
+std::size_t KeyframeMemory::array_bytes(const KeyframeView& view) {
+  return view.set.features.capacity() * sizeof(Feature) +
+         view.set.descriptors.capacity() * sizeof(Descriptor) +
+         view.landmarks.capacity() * sizeof(LandmarkHandle) +
+         view.bearings.capacity() * sizeof(Eigen::Vector3f) + view.grid.bytes();
 }
 
 std::size_t KeyframeMemory::bytes() const {
   std::size_t bytes = spare_lists_.size() * thinned_capacity_ * sizeof(LandmarkHandle);
-  for (const Keyframe& spare : spare_keyframes_) bytes += array_bytes(spare);
+  for (const KeyframeView& spare : spare_views_) bytes += array_bytes(spare);
   return bytes;
 }
 

@@ -21,14 +21,26 @@ using LandmarkHandle = Handle<Landmark>;
 // full:    a map point.
 enum class LandmarkState : std::uint8_t { kBearing, kWeak, kFull };
 
-// What one keyframe saw of a landmark. The host's own sighting is one too (it defines the bearing; BA skips
-// it).
+// What one camera of a keyframe saw of a landmark. The host's own sighting is one too: it defines the
+// bearing, and bundle adjustment skips it.
 struct Observation {
   KeyframeHandle keyframe;
-  std::int32_t feature = -1;                        // index in the keyframe's features
+  std::int32_t feature = -1;                        // index in the camera's features
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // measured (aligned) level-0 pixel
   float sigma_px = 1.0F;                            // its error, level-0 pixels
   std::uint8_t level = 0;                           // of the corner; the map fills it in
+  std::uint8_t camera = 0;                          // of the rig
+
+  // By the same camera of the same keyframe.
+  [[nodiscard]] bool is_by(KeyframeHandle observer, int observer_camera) const {
+    return keyframe == observer && camera == observer_camera;
+  }
+};
+
+// One camera of a keyframe.
+struct Observer {
+  KeyframeHandle keyframe;
+  int camera = 0;
 };
 
 struct Landmark {
@@ -36,10 +48,10 @@ struct Landmark {
   std::int32_t map_id = 0;
   LandmarkState state = LandmarkState::kBearing;
 
-  // Geometry. The anchor camera is rigidly attached to the host keyframe's body: at first it is the camera
-  // that saw it; when the host is forgotten the anchor stays where it was and is attached to the next host,
-  // so that nothing of bearing, depth or patch is lost. Point in host-body axes: (R_host_anchor f + rho
-  // t_host_anchor) / rho.
+  // Geometry. The anchor camera is rigidly attached to the host keyframe's body. At first it is the camera
+  // that saw the landmark. When the host is removed, the anchor stays in place and is attached to the next
+  // host: bearing, depth and patch stay valid. Point in host-body axes: (R_host_anchor f + rho t_host_anchor)
+  // / rho.
   KeyframeHandle host;
   SE3 T_host_anchor;
   Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // f, unit, anchor axes
@@ -49,13 +61,15 @@ struct Landmark {
   std::int64_t anchor_utime = 0;  // of the frame that host_pixel was seen in
   double inverse_depth = 0;       // rho >= 0, 1 / distance along f, 1 / map units
   double inverse_depth_sigma = 0;
-  double max_parallax_rad = 0;       // largest angle between the host's ray and another observer's
-  KeyframeHandle parallax_keyframe;  // the observer that gives it, with the host the best pair
+  double max_parallax_rad = 0;       // largest angle between the anchor's ray and an observation's
+  KeyframeHandle parallax_keyframe;  // the observation that gives it: keyframe and camera
+  std::uint8_t parallax_camera = 0;
 
   Patch patch;
   Descriptor descriptor;
   std::uint8_t host_level = 0;
-  std::pmr::vector<Observation> observations;  // by ascending keyframe id; in the room of its map
+  // By ascending keyframe id, then camera; in the memory of its map.
+  std::pmr::vector<Observation> observations;
 
   // Statistics for culling and reports.
   std::uint64_t created_keyframe = 0;  // id of the keyframe at which it was made (bearing) or promoted

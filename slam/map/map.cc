@@ -13,16 +13,18 @@ constexpr std::size_t kObservationStep = 4;
 // while their keyframes stay.
 constexpr double kObservedShare = 0.75;
 
-std::size_t observations_of_full_map(const CapacityConfig& capacity, std::size_t features) {
-  const std::size_t thinned =
-      features / KeyframeMemory::kThinnedShare * static_cast<std::size_t>(capacity.keyframes);
+std::size_t observations_of_full_map(const CapacityConfig& capacity, const MapOptions& options) {
+  const std::size_t views =
+      static_cast<std::size_t>(capacity.keyframes) * static_cast<std::size_t>(options.views_per_keyframe);
+  const std::size_t thinned = options.features / KeyframeMemory::kThinnedShare * views;
   return static_cast<std::size_t>(kObservedShare * static_cast<double>(thinned));
 }
 
-KeyframeMemoryOptions keyframe_memory(const CapacityConfig& capacity, std::size_t features) {
-  return {.features = features,
-          .with_pixels = static_cast<std::size_t>(capacity.window_images) + 1,
-          .thinned = static_cast<std::size_t>(capacity.keyframes)};
+KeyframeMemoryOptions keyframe_memory(const CapacityConfig& capacity, const MapOptions& options) {
+  const auto views = static_cast<std::size_t>(options.views_per_keyframe);
+  return {.features = options.features,
+          .with_pixels = views * (static_cast<std::size_t>(capacity.window_images) + 1),
+          .thinned = views * static_cast<std::size_t>(capacity.keyframes)};
 }
 
 // A removed keyframe's pose is asked for soon or never: tracking refers to it some views long.
@@ -44,10 +46,10 @@ Map::Map(const CapacityConfig& capacity, const Rig& rig, const MapOptions& optio
     : capacity_(capacity),
       rig_(rig),
       keyframes_(static_cast<std::size_t>(capacity.keyframes)),
-      observation_room_(observations_of_full_map(capacity, options.features),
+      observation_room_(observations_of_full_map(capacity, options),
                         static_cast<std::size_t>(capacity.observations_per_landmark) + kObservationStep),
       landmarks_(static_cast<std::size_t>(capacity.landmarks)),
-      keyframe_memory_(keyframe_memory(capacity, options.features)),
+      keyframe_memory_(keyframe_memory(capacity, options)),
       covisibility_({.wide_parallax_rad = options.wide_parallax_rad, .longest_list = options.covisible},
                     &keyframes_, landmarks_),
       skeleton_(skeleton_nodes(capacity)),
@@ -66,7 +68,9 @@ Map::Map(const CapacityConfig& capacity, const Rig& rig, const MapOptions& optio
 
 std::size_t Map::keyframe_bytes() const {
   std::size_t bytes = keyframes_.bytes() + keyframe_memory_.bytes();
-  keyframes_.for_each([&](KeyframeHandle, const Keyframe& k) { bytes += KeyframeMemory::array_bytes(k); });
+  keyframes_.for_each([&](KeyframeHandle, const Keyframe& k) {
+    for (int c = 0; c < k.views.size(); ++c) bytes += KeyframeMemory::array_bytes(k.views[c]);
+  });
   keyframes_.for_each_slot(
       [&bytes](const Keyframe& k) { bytes += k.covisible.capacity() * sizeof(Covisible); });
   return bytes;
@@ -82,7 +86,9 @@ KeyframeHandle Map::add_keyframe(Keyframe&& keyframe) {
   Keyframe& slot = keyframes_[handle];
   refill(std::move(keyframe), &slot);
   slot.id = next_keyframe_id_++;
-  slot.landmarks.assign(slot.set.features.size(), {});
+  slot.views.resize(camera_count());
+  for (int c = 0; c < slot.views.size(); ++c)
+    slot.views[c].landmarks.assign(slot.views[c].set.features.size(), {});
   slot.optimised = 0;
   skeleton_.add(slot.id, handle);
   add_to_chain(handle);
@@ -106,14 +112,18 @@ void Map::remove_keyframe(KeyframeHandle handle) {
   if (!keyframes_.contains(handle)) return;
   Keyframe& keyframe = keyframes_[handle];
   remove_from_skeleton(handle);
-  for (const LandmarkHandle& l : keyframe.landmarks)
-    if (landmarks_.contains(l)) remove_observation(l, handle);
+  for (int c = 0; c < keyframe.views.size(); ++c)
+    for (const LandmarkHandle& l : keyframe.views[c].landmarks)
+      if (landmarks_.contains(l)) remove_observation(l, handle, c);
   covisibility_.leave(handle);
   chain_.remove(handle);
-  if (keyframe.image)
-    keyframe_memory_.give_back(&keyframe);
-  else
-    keyframe_memory_.give_back_thinned(std::move(keyframe.landmarks));
+  for (int c = 0; c < keyframe.views.size(); ++c) {
+    KeyframeView& view = keyframe.views[c];
+    if (view.has_pixels())
+      keyframe_memory_.give_back(&view);
+    else
+      keyframe_memory_.give_back_thinned(std::move(view.landmarks));
+  }
   refill({}, &keyframe);
   keyframes_.release(handle);
 }
@@ -143,40 +153,44 @@ void Map::remove_from_skeleton(KeyframeHandle handle) {
 }
 
 void Map::thin_keyframe(KeyframeHandle handle) {
-  Keyframe& k = keyframes_[handle];
-  if (!k.image) return;  // it has been thinned before
-  k.image.reset();
-  const auto used = static_cast<std::size_t>(
-      std::count_if(k.landmarks.begin(), k.landmarks.end(), [](LandmarkHandle l) { return !l.is_null(); }));
+  for (int c = 0; c < keyframes_[handle].views.size(); ++c) thin_view(handle, c);
+}
+
+void Map::thin_view(KeyframeHandle handle, int camera) {
+  KeyframeView& view = keyframes_[handle].views[camera];
+  if (!view.has_pixels()) return;  // thinned before, or no image
+  view.image.reset();
+  const auto used = static_cast<std::size_t>(std::count_if(view.landmarks.begin(), view.landmarks.end(),
+                                                           [](LandmarkHandle l) { return !l.is_null(); }));
   std::vector<LandmarkHandle> landmarks = keyframe_memory_.take_thinned(used);
-  for (const LandmarkHandle& seen : k.landmarks) {
+  for (const LandmarkHandle& seen : view.landmarks) {
     Landmark* l = landmarks_.get(seen);
     if (l == nullptr) continue;
     for (Observation& o : l->observations)
-      if (o.keyframe == handle) o.feature = static_cast<std::int32_t>(landmarks.size());
+      if (o.is_by(handle, camera)) o.feature = static_cast<std::int32_t>(landmarks.size());
     landmarks.push_back(seen);
   }
-  keyframe_memory_.give_back(&k);
-  k.landmarks = std::move(landmarks);
+  keyframe_memory_.give_back(&view);
+  view.landmarks = std::move(landmarks);
 }
 
-LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
+LandmarkHandle Map::add_landmark(KeyframeHandle host, int camera, std::size_t feature) {
   Keyframe& keyframe = keyframes_[host];
-  if (!keyframe.landmarks[feature].is_null() || !keyframe.image) return {};
+  KeyframeView& view = keyframe.views[camera];
+  if (!view.landmarks[feature].is_null() || !view.has_pixels()) return {};
   Patch patch;
-  if (!keyframe.image->extract_patch(keyframe.set, feature, &patch)) return {};
+  if (!view.image->extract_patch(view.set, feature, &patch)) return {};
   const LandmarkHandle handle = landmarks_.allocate();
   if (handle.is_null()) return handle;
   Landmark& l = landmarks_[handle];
   l = Landmark{};
 
-  const Feature& f = keyframe.set.features[feature];
-  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(keyframe.camera)];
+  const Feature& f = view.set.features[feature];
   l.id = next_landmark_id_++;
   l.map_id = keyframe.map_id;
   l.host = host;
-  l.T_host_anchor = camera.T_body_camera;
-  l.host_camera = keyframe.camera;
+  l.T_host_anchor = this->camera(camera).T_body_camera;
+  l.host_camera = camera;
   l.host_pixel = {f.u_px, f.v_px};
   l.anchor_utime = keyframe.utime;
   if (!set_bearing(&l)) {
@@ -184,20 +198,24 @@ LandmarkHandle Map::add_landmark(KeyframeHandle host, std::size_t feature) {
     return {};
   }
   l.patch = patch;
-  l.descriptor = keyframe.set.descriptors[feature];
+  l.descriptor = view.set.descriptors[feature];
   l.host_level = f.level;
   l.created_keyframe = l.last_seen_keyframe = keyframe.id;
   l.created_utime = keyframe.utime;
-  l.observations.push_back({host, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.0F, f.level});
-  keyframe.landmarks[feature] = handle;
+  l.observations.push_back({host,
+                            static_cast<std::int32_t>(feature),
+                            {f.u_px, f.v_px},
+                            0.0F,
+                            f.level,
+                            static_cast<std::uint8_t>(camera)});
+  view.landmarks[feature] = handle;
   return handle;
 }
 
 bool Map::set_bearing(Landmark* l) const {
-  const Camera& camera = rig_.cameras[static_cast<std::size_t>(l->host_camera)].camera;
   Eigen::Vector3d bearing;
   Eigen::Matrix<double, 3, 2> derivative;
-  if (!camera.unproject(l->host_pixel, &bearing, &derivative)) return false;
+  if (!camera(l->host_camera).camera.unproject(l->host_pixel, &bearing, &derivative)) return false;
   l->bearing = bearing;
   l->d_bearing_d_pixel = derivative;
   return true;
@@ -210,24 +228,26 @@ void Map::set_camera(int index, const Camera& camera) {
     if (l.host_camera == index) (void)set_bearing(&l);
   });
   keyframes_.for_each([&](KeyframeHandle, Keyframe& k) {
-    if (k.camera != index || !k.image) return;
-    for (std::size_t i = 0; i < k.bearings.size(); ++i) {
+    KeyframeView& view = k.views[index];
+    if (!view.has_pixels()) return;
+    for (std::size_t i = 0; i < view.bearings.size(); ++i) {
       Eigen::Vector3d bearing;
-      if (camera.unproject({k.set.features[i].u_px, k.set.features[i].v_px}, &bearing))
-        k.bearings[i] = bearing.cast<float>();
+      if (camera.unproject({view.set.features[i].u_px, view.set.features[i].v_px}, &bearing))
+        view.bearings[i] = bearing.cast<float>();
     }
   });
 }
 
 void Map::detach_feature(const Observation& o) {
-  if (Keyframe* k = keyframes_.get(o.keyframe)) k->landmarks[static_cast<std::size_t>(o.feature)] = {};
+  if (Keyframe* k = keyframes_.get(o.keyframe))
+    k->views[o.camera].landmarks[static_cast<std::size_t>(o.feature)] = {};
 }
 
 void Map::remove_landmark(LandmarkHandle handle) {
   Landmark* l = landmarks_.get(handle);
   if (l == nullptr) return;
   for (const Observation& o : l->observations) detach_feature(o);
-  // A slot must not keep what its best-seen landmark once needed, as with "= {}" it would.
+  // "= {}" would keep the capacity, and every slot would grow to its best-seen landmark in time.
   l->observations.clear();
   l->observations.shrink_to_fit();
   landmarks_.release(handle);
@@ -239,14 +259,20 @@ const Observation* Map::find_observation(const Landmark& landmark, KeyframeHandl
   return nullptr;
 }
 
+const Observation* Map::find_observation(const Landmark& landmark, KeyframeHandle keyframe, int camera) {
+  for (const Observation& o : landmark.observations)
+    if (o.is_by(keyframe, camera)) return &o;
+  return nullptr;
+}
+
 bool Map::add_observation(LandmarkHandle handle, const Observation& observation) {
   Landmark& l = landmarks_[handle];
   Keyframe& k = keyframes_[observation.keyframe];
+  std::vector<LandmarkHandle>& seen = k.views[observation.camera].landmarks;
   const auto feature = static_cast<std::size_t>(observation.feature);
-  if (observation.feature < 0 || feature >= k.landmarks.size() || !k.landmarks[feature].is_null())
-    return false;
-  if (find_observation(l, observation.keyframe) != nullptr) return false;
-  k.landmarks[feature] = handle;
+  if (observation.feature < 0 || feature >= seen.size() || !seen[feature].is_null()) return false;
+  if (find_observation(l, observation.keyframe, observation.camera) != nullptr) return false;
+  seen[feature] = handle;
   insert_sorted(observation, &l);
   l.last_seen_keyframe = std::max(l.last_seen_keyframe, k.id);
   note_parallax(observation, &l);
@@ -257,16 +283,19 @@ bool Map::add_observation(LandmarkHandle handle, const Observation& observation)
 
 void Map::insert_sorted(const Observation& observation, Landmark* l) {
   const Keyframe& k = keyframes_[observation.keyframe];
-  const auto later = std::find_if(l->observations.begin(), l->observations.end(),
-                                  [&](const Observation& o) { return keyframes_[o.keyframe].id > k.id; });
+  const auto later = std::find_if(l->observations.begin(), l->observations.end(), [&](const Observation& o) {
+    return o.keyframe == observation.keyframe ? o.camera > observation.camera
+                                              : keyframes_[o.keyframe].id > k.id;
+  });
   const auto at = later - l->observations.begin();
   // Doubling would leave a third of the memory unused.
   if (l->observations.size() == l->observations.capacity())
     l->observations.reserve(l->observations.size() + kObservationStep);
   const auto added = l->observations.insert(l->observations.begin() + at, observation);
-  // A thinned keyframe has no features: its observations keep the level.
+  // A thinned view has no features: its observations keep the level.
+  const std::vector<Feature>& features = k.views[observation.camera].set.features;
   const auto feature = static_cast<std::size_t>(observation.feature);
-  if (feature < k.set.features.size()) added->level = k.set.features[feature].level;
+  if (feature < features.size()) added->level = features[feature].level;
 }
 
 void Map::note_parallax(const Observation& o, Landmark* l) const {
@@ -274,22 +303,25 @@ void Map::note_parallax(const Observation& o, Landmark* l) const {
   if (angle <= l->max_parallax_rad) return;
   l->max_parallax_rad = angle;
   l->parallax_keyframe = o.keyframe;
+  l->parallax_camera = o.camera;
 }
 
 void Map::thin_observations(Landmark& l, LandmarkHandle handle) {
-  // The host defines the bearing, the best pair the depth, the newest ones the link to tracking: of the rest
-  // the one in the middle tells least that its neighbours do not.
+  // The host defines the bearing, the best pair the depth, the newest ones link to tracking. Of the rest the
+  // middle one differs least from its neighbours.
+  const auto is_needed = [&l](const Observation& o) {
+    return o.keyframe == l.host || o.is_by(l.parallax_keyframe, l.parallax_camera);
+  };
   std::size_t middle = l.observations.size() / 2;
-  while (middle + 1 < l.observations.size() && (l.observations[middle].keyframe == l.host ||
-                                                l.observations[middle].keyframe == l.parallax_keyframe))
-    ++middle;
-  remove_observation(handle, l.observations[middle].keyframe);
+  while (middle + 1 < l.observations.size() && is_needed(l.observations[middle])) ++middle;
+  const Observation& thinned = l.observations[middle];
+  remove_observation(handle, thinned.keyframe, thinned.camera);
 }
 
-bool Map::remove_observation(LandmarkHandle handle, KeyframeHandle keyframe) {
+bool Map::remove_observation(LandmarkHandle handle, KeyframeHandle keyframe, int camera) {
   Landmark& l = landmarks_[handle];
   const auto it = std::find_if(l.observations.begin(), l.observations.end(),
-                               [&](const Observation& o) { return o.keyframe == keyframe; });
+                               [&](const Observation& o) { return o.is_by(keyframe, camera); });
   if (it == l.observations.end()) return true;
   detach_feature(*it);
   l.observations.erase(it);
@@ -297,13 +329,14 @@ bool Map::remove_observation(LandmarkHandle handle, KeyframeHandle keyframe) {
     remove_landmark(handle);
     return false;
   }
-  if (l.parallax_keyframe == keyframe) {
-    // The best pair is gone: the best of those that are left.
+  if (l.parallax_keyframe == keyframe && l.parallax_camera == camera) {
+    // The best pair is gone: search the best of those left.
     l.max_parallax_rad = 0.0;
     l.parallax_keyframe = {};
     for (const Observation& o : l.observations) note_parallax(o, &l);
   }
-  if (l.host == keyframe) rehost(handle, l.observations.front().keyframe);
+  if (l.host == keyframe && find_observation(l, keyframe) == nullptr)
+    rehost(handle, l.observations.front().keyframe);
   return true;
 }
 
@@ -320,8 +353,8 @@ SE3 Map::T_world_anchor(const Landmark& l) const {
   return keyframes_[l.host].T_world_body * l.T_host_anchor;
 }
 
-SE3 Map::T_world_camera(const Keyframe& k) const {
-  return k.T_world_body * rig_.cameras[static_cast<std::size_t>(k.camera)].T_body_camera;
+SE3 Map::T_world_camera(const Keyframe& keyframe, int index) const {
+  return keyframe.T_world_body * camera(index).T_body_camera;
 }
 
 Eigen::Vector4d Map::world_point(const Landmark& l) const {
@@ -335,10 +368,9 @@ Eigen::Vector4d Map::world_point(const Landmark& l) const {
 double Map::parallax(const Landmark& l, const Observation& o) const {
   const Keyframe& k = keyframes_[o.keyframe];
   Eigen::Vector3d bearing;
-  const Camera& camera = rig_.cameras[static_cast<std::size_t>(k.camera)].camera;
-  if (!camera.unproject(o.pixel.cast<double>(), &bearing)) return 0.0;
+  if (!camera(o.camera).camera.unproject(o.pixel.cast<double>(), &bearing)) return 0.0;
   const Eigen::Vector3d a = T_world_anchor(l).q * l.bearing;
-  const Eigen::Vector3d b = T_world_camera(k).q * bearing;
+  const Eigen::Vector3d b = T_world_camera(k, o.camera).q * bearing;
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 

@@ -1,7 +1,7 @@
 // The map: pools of keyframes and landmarks and the links between them. Mapping is its only writer; tracking
 // reads LocalView copies. Keeps both sides of every link consistent:
-//     keyframe.landmarks[o.feature] == landmark   <=>   an observation o of the landmark names keyframe and
-//     feature.
+//     keyframe.views[o.camera].landmarks[o.feature] == landmark
+//         <=>   an observation o of the landmark names keyframe, camera and feature.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ namespace farpoint::slam {
 
 struct MapOptions {
   double wide_parallax_rad = 0.0;  // a landmark with at least this parallax shows translation
-  std::size_t features = 0;        // most of one keyframe, preallocated; 0: allocated when needed
+  std::size_t features = 0;        // most of one view, preallocated; 0: allocated when needed
+  int views_per_keyframe = 1;      // preallocated: cameras that give images
   std::size_t covisible = 0;       // longest list of covisible keyframes; 0: no limit
 };
 
@@ -37,8 +38,14 @@ class Map {
 
   // --- keyframes
 
-  // A keyframe to be filled and added, with preallocated arrays of arbitrary contents (KeyframeMemory).
-  [[nodiscard]] Keyframe preallocated_keyframe() { return keyframe_memory_.take(); }
+  // A keyframe with an empty view a camera, to be filled and added.
+  [[nodiscard]] Keyframe new_keyframe() const {
+    Keyframe keyframe;
+    keyframe.views = PerCamera<KeyframeView>(camera_count());
+    return keyframe;
+  }
+  // A view for it, with preallocated arrays of arbitrary contents (KeyframeMemory).
+  [[nodiscard]] KeyframeView preallocated_view() { return keyframe_memory_.take(); }
   // Adds the keyframe to the end of its map's chain. Null where the pool is full: call remove_keyframe()
   // first.
   [[nodiscard]] KeyframeHandle add_keyframe(Keyframe&& keyframe);
@@ -52,26 +59,30 @@ class Map {
 
   // --- landmarks
 
-  // A new landmark of state bearing hosted by (keyframe, feature), with that one observation. Null where the
-  // pool is full or no patch can be cut around the feature.
-  [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, std::size_t feature);
+  // A new landmark of state bearing hosted by (keyframe, camera, feature), with that one observation. Null
+  // where the pool is full or no patch can be cut around the feature.
+  [[nodiscard]] LandmarkHandle add_landmark(KeyframeHandle host, int camera, std::size_t feature);
   void remove_landmark(LandmarkHandle handle);
-  // False where the keyframe sees the landmark already, has no such feature, or the feature belongs to
-  // another landmark.
+  // False where that camera of the keyframe sees the landmark already, has no such feature, or the feature
+  // belongs to another landmark.
   bool add_observation(LandmarkHandle handle, const Observation& observation);
-  // Removes the observation by `keyframe`; re-hosts the landmark where it was the host's. Removes the
-  // landmark where fewer than two are left. True while the landmark lives.
-  bool remove_observation(LandmarkHandle handle, KeyframeHandle keyframe);
+  // Removes the observation by that camera of `keyframe`. Re-hosts the landmark where the keyframe was the
+  // host and observes it no more. Removes the landmark where fewer than two observations are left. True while
+  // the landmark lives.
+  bool remove_observation(LandmarkHandle handle, KeyframeHandle keyframe, int camera);
   // Attaches the anchor to another observing keyframe; bearing, depth and patch stay. Does nothing where
   // new_host does not observe the landmark: removal of a keyframe reaches only the landmarks it observes.
   void rehost(LandmarkHandle handle, KeyframeHandle new_host);
 
+  // The first observation by the keyframe, by whichever camera; null where there is none.
   [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe);
+  [[nodiscard]] static const Observation* find_observation(const Landmark& landmark, KeyframeHandle keyframe,
+                                                           int camera);
   // Homogeneous world point (x, y, z, rho): the point is xyz / rho, also where rho is 0.
   [[nodiscard]] Eigen::Vector4d world_point(const Landmark& landmark) const;
   [[nodiscard]] SE3 T_world_anchor(const Landmark& landmark) const;
-  [[nodiscard]] SE3 T_world_camera(const Keyframe& keyframe) const;
-  // Angle between the host's ray and the observer's, by their bearings and poses, rad.
+  [[nodiscard]] SE3 T_world_camera(const Keyframe& keyframe, int camera) const;
+  // Angle between the anchor's ray and the observation's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 
   // --- all of it
@@ -100,12 +111,17 @@ class Map {
   [[nodiscard]] Pool<Landmark>& landmarks() { return landmarks_; }
   [[nodiscard]] const Pool<Landmark>& landmarks() const { return landmarks_; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] const RigCamera& camera(int index) const {
+    return rig_.cameras[static_cast<std::size_t>(index)];
+  }
+  [[nodiscard]] int camera_count() const { return static_cast<int>(rig_.cameras.size()); }
 
  private:
   void add_to_chain(KeyframeHandle handle);
   // The keyframe that a removed one is attached to; null where its map has no other.
   [[nodiscard]] KeyframeHandle skeleton_parent(KeyframeHandle handle) const;
   void remove_from_skeleton(KeyframeHandle handle);
+  void thin_view(KeyframeHandle handle, int camera);
   [[nodiscard]] bool set_bearing(Landmark* landmark) const;
   void detach_feature(const Observation& observation);
   void insert_sorted(const Observation& observation, Landmark* landmark);

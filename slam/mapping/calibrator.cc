@@ -45,7 +45,8 @@ Jacobian24 parameter_derivative(const Camera& camera, const Eigen::Vector3d& poi
 // they would speak for it.
 class WindowEquations {
  public:
-  WindowEquations(const BundleProblem& problem, const Camera& camera) : p_(problem), camera_(camera) {
+  WindowEquations(const BundleProblem& problem, const Camera& camera, int index)
+      : p_(problem), camera_(camera), index_(index) {
     poses_.resize(static_cast<int>(p_.poses.size()));
     poses_.set_zero();
     border_.assign(p_.poses.size(), Matrix64::Zero());
@@ -53,15 +54,18 @@ class WindowEquations {
     frames_.update(p_);
   }
 
-  // d_bearing: of the point, by its host pixel.
+  // d_bearing: of the point, by its host pixel; zero where another camera is the anchor.
   void add(const BundleProblem::Point& point, const Eigen::Matrix<double, 3, 2>& d_bearing) {
-    Eigen::Vector2d host_pixel;
-    if (!camera_.project(point.bearing, &host_pixel)) return;
-    const Jacobian24 d_host_pixel = parameter_derivative(camera_, point.bearing, host_pixel);
+    Matrix34 d_xyz_d_delta = Matrix34::Zero();
+    if (!d_bearing.isZero(0.0)) {
+      Eigen::Vector2d host_pixel;
+      if (!camera_.project(point.bearing, &host_pixel)) return;
+      const Jacobian24 d_host_pixel = parameter_derivative(camera_, point.bearing, host_pixel);
+      // The host's pixel is given; its bearing moves against what the projection would do.
+      d_xyz_d_delta = -(frames_.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing *
+                      d_host_pixel;
+    }
     world_ = frames_.world_point(point);
-    // The host's pixel is given; its bearing moves against what the projection would do.
-    const Eigen::Matrix<double, 3, kParameters> d_xyz_d_delta =
-        -(frames_.body(point.host).R_world_body * point.T_host_anchor.rotation()) * d_bearing * d_host_pixel;
     part_ = {};
     couplings_.clear();
     HostSums sums;
@@ -128,7 +132,8 @@ class WindowEquations {
     WorldLinearisation lin;
     if (!linearise_world(world_, view, m, &lin)) return;
     const Eigen::Vector3d p_c = view.R_camera_world * world_.xyz + world_.inverse_depth * view.t_camera_world;
-    const Jacobian24 d_pixel = parameter_derivative(camera_, p_c, m.pixel + m.sigma_px * lin.residual);
+    Jacobian24 d_pixel = Jacobian24::Zero();
+    if (m.camera == index_) d_pixel = parameter_derivative(camera_, p_c, m.pixel + m.sigma_px * lin.residual);
     const Jacobian24 Jd = d_pixel / m.sigma_px + lin.d_xyz * d_xyz_d_delta;
     part_.hessian += lin.d_inverse_depth.squaredNorm();
     part_.gradient += lin.d_inverse_depth.dot(lin.residual);
@@ -183,6 +188,7 @@ class WindowEquations {
 
   const BundleProblem& p_;
   const Camera& camera_;
+  const int index_;  // of camera_ in the rig
   BundleFrames frames_;
   BlockMatrix poses_;
   std::vector<Matrix64> border_;  // of the poses, with the calibration
@@ -213,9 +219,10 @@ Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
   return Camera(p);
 }
 
-Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given)
+Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given, int index)
     : config_(config),
       given_(given),
+      index_(index),
       camera_(given),
       prior_(prior_information(config)),
       information_(prior_) {}
@@ -239,7 +246,7 @@ CalibrationDelta Calibrator::wanted_by_images() const {
 Calibrator::Quadratic Calibrator::window_information(
     const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
   Quadratic out;
-  WindowEquations equations(problem, camera_);
+  WindowEquations equations(problem, camera_, index_);
   for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
   if (!equations.reduce(&out.H, &out.g)) return out;
   out.H = (0.5 * (out.H + out.H.transpose())).eval();

@@ -24,11 +24,12 @@ using CalibrationDelta = Eigen::Vector4d;
 
 class Calibrator {
  public:
-  Calibrator(const CalibrationConfig& config, const Camera& given);
+  // Refines camera `index` of the rig; the other cameras are taken as right.
+  Calibrator(const CalibrationConfig& config, const Camera& given, int index = 0);
 
   // Uses a window at the optimum of its poses and inverse depths. d_bearing_d_pixel: of every point, at its
-  // host pixel, anchor axes. True where the estimate moved noticeably and camera() should be used from now
-  // on.
+  // host pixel, anchor axes; zero where another camera is the anchor. True where the estimate moved
+  // noticeably and camera() should be used from now on.
   bool update(const BundleProblem& problem,
               const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing_d_pixel);
 
@@ -47,6 +48,7 @@ class Calibrator {
   // off.
   [[nodiscard]] bool contradicts_given() const { return contradicts_given_; }
   [[nodiscard]] const Camera& camera() const { return camera_; }
+  [[nodiscard]] int camera_index() const { return index_; }
 
  private:
   struct Quadratic {
@@ -60,6 +62,7 @@ class Calibrator {
 
   CalibrationConfig config_;
   Camera given_;
+  int index_;  // in the rig
   CalibrationDelta delta_ = CalibrationDelta::Zero();
   Camera camera_;  // given_ changed by delta_
   bool contradicts_given_ = false;

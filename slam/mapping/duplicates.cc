@@ -22,8 +22,9 @@ void Duplicates::fuse(LandmarkHandle into, LandmarkHandle from) {
   Landmark& l = map_.landmarks()[into];
   for (const Observation& o : theirs) {
     Observation measured;
-    if (Map::find_observation(l, o.keyframe) == nullptr &&
-        measure_observation(config_, map_, l, o.keyframe, static_cast<std::size_t>(o.feature), &measured))
+    if (Map::find_observation(l, o.keyframe, o.camera) == nullptr &&
+        measure_observation(config_, map_, l, o.keyframe, o.camera, static_cast<std::size_t>(o.feature),
+                            &measured))
       map_.add_observation(into, measured);
   }
   l.found += found;
@@ -31,7 +32,7 @@ void Duplicates::fuse(LandmarkHandle into, LandmarkHandle from) {
   ++counts_.landmarks_fused;
 }
 
-int Duplicates::find_feature(const Keyframe& keyframe, const Predictor& predictor, const Landmark& landmark) {
+int Duplicates::find_feature(const KeyframeView& view, const Predictor& predictor, const Landmark& landmark) {
   Prediction p;
   if (!predictor.predict(anchors_.prediction_input(map_, landmark), 4.0, &p) || !is_matchable(p)) return -1;
   const double scale_factor = config_.pyramid.scale_factor;
@@ -46,12 +47,12 @@ int Duplicates::find_feature(const Keyframe& keyframe, const Predictor& predicto
   q.max_level = level + 1;
   q.max_hamming = config_.tracking.max_hamming * 3 / 4;
   q.ratio = 1.0F;
-  return find_descriptor(keyframe.set, keyframe.grid, q, [](std::size_t) { return true; });
+  return find_descriptor(view.set, view.grid, q, [](std::size_t) { return true; });
 }
 
-void Duplicates::join(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature) {
+void Duplicates::join(LandmarkHandle landmark, Observer observer, std::size_t feature) {
   const Landmark& l = map_.landmarks()[landmark];
-  const LandmarkHandle owner = map_.keyframes()[keyframe].landmarks[feature];
+  const LandmarkHandle owner = map_.keyframes()[observer.keyframe].views[observer.camera].landmarks[feature];
   const Landmark* other = map_.landmarks().get(owner);
   if (other != nullptr && other->state != LandmarkState::kBearing) {
     if (other->observations.size() > l.observations.size())
@@ -61,43 +62,56 @@ void Duplicates::join(LandmarkHandle landmark, KeyframeHandle keyframe, std::siz
     return;
   }
   Observation o;
-  if (!measure_observation(config_, map_, l, keyframe, feature, &o)) return;
+  if (!measure_observation(config_, map_, l, observer.keyframe, observer.camera, feature, &o)) return;
   if (other != nullptr) map_.remove_landmark(owner);
   map_.add_observation(landmark, o);
 }
 
 void Duplicates::search_into(KeyframeHandle handle, const std::vector<LandmarkHandle>& landmarks) {
-  const Keyframe& keyframe = map_.keyframes()[handle];
-  if (!keyframe.image) return;
-  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
-  const Predictor predictor(camera, map_.T_world_camera(keyframe).inverse());
+  for (int c = 0; c < map_.keyframes()[handle].views.size(); ++c) search_into_view({handle, c}, landmarks);
+}
+
+void Duplicates::search_into_view(Observer observer, const std::vector<LandmarkHandle>& landmarks) {
+  const Keyframe& keyframe = map_.keyframes()[observer.keyframe];
+  const KeyframeView& view = keyframe.views[observer.camera];
+  if (!view.has_pixels()) return;
+  const Predictor predictor(map_.camera(observer.camera).camera,
+                            map_.T_world_camera(keyframe, observer.camera).inverse());
   anchors_.forget();
   for (const LandmarkHandle& lh : landmarks) {
     const Landmark* l = map_.landmarks().get(lh);
-    if (l == nullptr || l->state == LandmarkState::kBearing || Map::find_observation(*l, handle) != nullptr)
+    if (l == nullptr || l->state == LandmarkState::kBearing ||
+        Map::find_observation(*l, observer.keyframe, observer.camera) != nullptr)
       continue;
-    const int feature = find_feature(keyframe, predictor, *l);
-    if (feature >= 0) join(lh, handle, static_cast<std::size_t>(feature));
+    const int feature = find_feature(view, predictor, *l);
+    if (feature >= 0) join(lh, observer, static_cast<std::size_t>(feature));
   }
 }
 
-void Duplicates::fuse_neighbourhood(KeyframeHandle keyframe) {
-  own_ = map_.keyframes()[keyframe].landmarks;
-  for (const KeyframeHandle& n : neighbours(keyframe)) search_into(n, own_);
-  search_neighbours_landmarks(keyframe);
+void Duplicates::fuse_neighbourhood(KeyframeHandle handle) {
+  const Keyframe& keyframe = map_.keyframes()[handle];
+  own_ = keyframe.views[0].landmarks;
+  for (int c = 1; c < keyframe.views.size(); ++c)
+    own_.insert(own_.end(), keyframe.views[c].landmarks.begin(), keyframe.views[c].landmarks.end());
+  for (const KeyframeHandle& n : neighbours(handle)) search_into(n, own_);
+  search_neighbours_landmarks(handle);
 }
 
 void Duplicates::search_neighbours_landmarks(KeyframeHandle keyframe) {
   theirs_.clear();
   taken_.assign(map_.landmarks().capacity(), 0);
-  for (const KeyframeHandle& n : neighbours(keyframe))
-    for (const LandmarkHandle& h : map_.keyframes()[n].landmarks)
+  for (const KeyframeHandle& n : neighbours(keyframe)) take_landmarks(map_.keyframes()[n]);
+  search_into(keyframe, theirs_);
+}
+
+void Duplicates::take_landmarks(const Keyframe& keyframe) {
+  for (int c = 0; c < keyframe.views.size(); ++c)
+    for (const LandmarkHandle& h : keyframe.views[c].landmarks)
       // A landmark already taken costs no look at its slot, which lies far away in memory.
       if (!h.is_null() && taken_[h.index] == 0 && map_.landmarks().contains(h)) {
         taken_[h.index] = 1;
         theirs_.push_back(h);
       }
-  search_into(keyframe, theirs_);
 }
 
 }  // namespace farpoint::slam

@@ -30,10 +30,12 @@ class Duplicates {
 
  private:
   [[nodiscard]] std::vector<KeyframeHandle> neighbours(KeyframeHandle keyframe) const;
-  // Index of the keyframe's feature that shows the landmark; -1 where there is none.
-  [[nodiscard]] int find_feature(const Keyframe& keyframe, const Predictor& predictor,
+  // Index of the view's feature that shows the landmark; -1 where there is none.
+  [[nodiscard]] int find_feature(const KeyframeView& view, const Predictor& predictor,
                                  const Landmark& landmark);
-  void join(LandmarkHandle landmark, KeyframeHandle keyframe, std::size_t feature);
+  void take_landmarks(const Keyframe& keyframe);
+  void search_into_view(Observer observer, const std::vector<LandmarkHandle>& landmarks);
+  void join(LandmarkHandle landmark, Observer observer, std::size_t feature);
 
   const EstimatorConfig& config_;
   Map& map_;

@@ -18,9 +18,11 @@ double inverse_distance_from(const Eigen::Vector3d& place_w, const Eigen::Vector
 // Whether enough other keyframes see the landmark at least as finely as level `level` does.
 bool seen_by_others(const Landmark& landmark, KeyframeHandle but, int level) {
   int others = 0;
+  KeyframeHandle last;  // observations of one keyframe by several cameras lie one behind the other
   for (const Observation& o : landmark.observations) {
-    if (o.keyframe != but && o.level <= level + 1) ++others;
-    if (others >= kOtherObservers) return true;
+    if (o.keyframe == but || o.keyframe == last || o.level > level + 1) continue;
+    last = o.keyframe;
+    if (++others >= kOtherObservers) return true;
   }
   return false;
 }
@@ -30,13 +32,16 @@ bool seen_by_others(const Landmark& landmark, KeyframeHandle but, int level) {
 bool redundant(const Map& map, KeyframeHandle handle) {
   const Keyframe& k = map.keyframes()[handle];
   double all = 0.0, seen_elsewhere = 0.0;
-  for (const LandmarkHandle& h : k.landmarks) {
-    const Landmark* l = map.landmarks().get(h);
-    if (l == nullptr || l->state == LandmarkState::kBearing) continue;
-    const double weight = inverse_distance_from(k.T_world_body.t, map.world_point(*l));
-    all += weight;
-    if (seen_by_others(*l, handle, Map::find_observation(*l, handle)->level)) seen_elsewhere += weight;
-  }
+  for (int c = 0; c < k.views.size(); ++c)
+    for (const LandmarkHandle& h : k.views[c].landmarks) {
+      const Landmark* l = map.landmarks().get(h);
+      if (l == nullptr || l->state == LandmarkState::kBearing) continue;
+      const Observation& first = *Map::find_observation(*l, handle);
+      if (first.camera != c) continue;  // counted with that camera
+      const double weight = inverse_distance_from(k.T_world_body.t, map.world_point(*l));
+      all += weight;
+      if (seen_by_others(*l, handle, first.level)) seen_elsewhere += weight;
+    }
   return all > 0.0 && seen_elsewhere > kRedundantShare * all;
 }
 
@@ -71,11 +76,13 @@ void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Ma
   // A full landmark pool: the oldest keyframes' landmarks go with them.
   while (map->landmarks().size() > map->landmarks().capacity() * 9 / 10 && alive.size() > 1) {
     const KeyframeHandle oldest = alive.back();
-    const std::vector<LandmarkHandle> seen = map->keyframes()[oldest].landmarks;
-    for (const LandmarkHandle& h : seen) {
-      const Landmark* l = map->landmarks().get(h);
-      if (l != nullptr && l->last_seen_keyframe + kept < newest_id)
-        map->remove_landmark(h), ++counts->landmarks_culled;
+    for (int c = 0; c < map->keyframes()[oldest].views.size(); ++c) {
+      const std::vector<LandmarkHandle> seen = map->keyframes()[oldest].views[c].landmarks;
+      for (const LandmarkHandle& h : seen) {
+        const Landmark* l = map->landmarks().get(h);
+        if (l != nullptr && l->last_seen_keyframe + kept < newest_id)
+          map->remove_landmark(h), ++counts->landmarks_culled;
+      }
     }
     map->remove_keyframe(oldest);
     alive.pop_back();

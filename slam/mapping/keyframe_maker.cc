@@ -19,19 +19,25 @@ void unproject_features(const Camera& camera, const FeatureSet& set, std::vector
 
 }  // namespace
 
+KeyframeView KeyframeMaker::copy(const FrameView& view, const Camera& camera) {
+  KeyframeView out = map_.preallocated_view();
+  out.set = view.set;
+  out.grid = view.grid;
+  out.image = view.image;
+  unproject_features(camera, out.set, &out.bearings);
+  return out;
+}
+
 KeyframeHandle KeyframeMaker::make(const Frame& frame, const SE3& T_world_body, std::int32_t map_id) {
-  Keyframe k = map_.preallocated_keyframe();
+  if (map_.keyframes().full()) return {};
+  Keyframe k = map_.new_keyframe();
   k.map_id = map_id;
   k.utime = frame.utime;
   k.frame_number = frame.number;
-  k.camera = frame.camera;
   k.T_world_body = T_world_body;
-  k.set = frame.set;
-  k.grid = frame.grid;
-  k.image = frame.image;
-  unproject_features(map_.rig().cameras[static_cast<std::size_t>(frame.camera)].camera, k.set, &k.bearings);
+  for (int c = 0; c < frame.views.size(); ++c)
+    if (!frame.views[c].set.features.empty()) k.views[c] = copy(frame.views[c], map_.camera(c).camera);
   const KeyframeHandle handle = map_.add_keyframe(std::move(k));
-  if (handle.is_null()) return handle;
   ++counts_.keyframes_made;
   newest_ = handle;
   newest_id_ = map_.keyframes()[handle].id;

@@ -14,7 +14,8 @@ class KeyframeMaker {
   // Both must outlive this.
   KeyframeMaker(Map* map, MappingCounts* counts) : map_(*map), counts_(*counts) {}
 
-  // Copies the frame into the map and makes it the newest keyframe. Null where the map is full.
+  // Copies the frame, every camera's view that has features, into the map: it becomes the newest keyframe.
+  // Null where the map is full.
   KeyframeHandle make(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);
 
   // The keyframe made last; the handle ends when the map removes it.
@@ -23,6 +24,8 @@ class KeyframeMaker {
   [[nodiscard]] std::uint64_t newest_id() const { return newest_id_; }
 
  private:
+  [[nodiscard]] KeyframeView copy(const FrameView& view, const Camera& camera);
+
   Map& map_;
   MappingCounts& counts_;
   KeyframeHandle newest_;

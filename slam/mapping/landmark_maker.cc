@@ -65,30 +65,35 @@ bool LandmarkMaker::wanted(LandmarkHandle handle) const {
 void LandmarkMaker::process(KeyframeHandle newer, const std::vector<KeyframeHandle>& neighbours) {
   witnesses_ = neighbours;
   for (const KeyframeHandle older : neighbours) {
-    const Keyframe& k_new = map_.keyframes()[newer];
-    const Keyframe& k_old = map_.keyframes()[older];
-    if (!k_old.image || k_old.camera != k_new.camera) continue;
-    const PairGeometry geometry = relate(k_new, k_old);
-    if (!geometry.valid) continue;
-    find_pairs(k_new, k_old, geometry, &pairs_);
-    for (const Pair& pair : pairs_) consume(newer, older, geometry, pair);
+    const int cameras = map_.keyframes()[newer].views.size();
+    for (int c = 0; c < cameras; ++c) pair_views({newer, c}, {older, c});
   }
 }
 
-LandmarkMaker::PairGeometry LandmarkMaker::relate(const Keyframe& newer, const Keyframe& older) const {
+void LandmarkMaker::pair_views(Observer newer, Observer older) {
+  if (!view_of(older).has_pixels() || !view_of(newer).has_pixels()) return;
+  const PairGeometry geometry = relate(newer, older);
+  if (!geometry.valid) return;
+  find_pairs(newer, older, geometry, &pairs_);
+  for (const Pair& pair : pairs_) consume(newer, older, geometry, pair);
+}
+
+LandmarkMaker::PairGeometry LandmarkMaker::relate(Observer newer, Observer older) const {
   PairGeometry g;
-  g.T_new_old = map_.T_world_camera(newer).inverse() * map_.T_world_camera(older);
+  const SE3 T_world_old = map_.T_world_camera(map_.keyframes()[older.keyframe], older.camera);
+  g.T_new_old = map_.T_world_camera(map_.keyframes()[newer.keyframe], newer.camera).inverse() * T_world_old;
   const SE3 T_old_new = g.T_new_old.inverse();
   g.R_old_new = T_old_new.rotation();
   g.t_old_new = T_old_new.t;
   const double baseline = g.T_new_old.t.norm();
-  // Depth of the scene as the older keyframe sees it.
+  // Depth of the scene as the older view shows it.
   std::vector<double> inverse_depths;
-  const SE3 T_old_world = map_.T_world_camera(older).inverse();
+  const std::vector<LandmarkHandle>& seen = view_of(older).landmarks;
+  const SE3 T_old_world = T_world_old.inverse();
   // A share of the landmarks gives the quantile well enough.
   constexpr std::size_t kStride = 3;
-  for (std::size_t i = 0; i < older.landmarks.size(); i += kStride) {
-    const Landmark* l = map_.landmarks().get(older.landmarks[i]);
+  for (std::size_t i = 0; i < seen.size(); i += kStride) {
+    const Landmark* l = map_.landmarks().get(seen[i]);
     if (l == nullptr || l->state == LandmarkState::kBearing) continue;
     const Eigen::Vector4d p = map_.world_point(*l);
     const double distance = (T_old_world.q * p.head<3>() + p[3] * T_old_world.t).norm();
@@ -118,10 +123,11 @@ bool LandmarkMaker::epipolar_segment(const Eigen::Vector3f& bearing_new, const C
   return visible;
 }
 
-void LandmarkMaker::find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
+void LandmarkMaker::find_pairs(Observer newer_view, Observer older_view, const PairGeometry& geometry,
                                std::vector<Pair>* out) {
   out->clear();
-  const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(older.camera)].camera;
+  const KeyframeView &newer = view_of(newer_view), &older = view_of(older_view);
+  const Camera& camera = map_.camera(older_view.camera).camera;
   best_of_old_.assign(older.set.features.size(), -1);
   wanted_old_.resize(older.set.features.size());
   ++round_;
@@ -160,11 +166,10 @@ void LandmarkMaker::find_pairs(const Keyframe& newer, const Keyframe& older, con
   }
 }
 
-void LandmarkMaker::consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry,
-                            const Pair& pair) {
+void LandmarkMaker::consume(Observer newer, Observer older, const PairGeometry& geometry, const Pair& pair) {
   // Earlier pairs may have changed what hangs on these features.
-  const LandmarkHandle at_new = map_.keyframes()[newer].landmarks[pair.feature_new];
-  const LandmarkHandle at_old = map_.keyframes()[older].landmarks[pair.feature_old];
+  const LandmarkHandle at_new = view_of(newer).landmarks[pair.feature_new];
+  const LandmarkHandle at_old = view_of(older).landmarks[pair.feature_old];
   if (!wanted(at_new) || !wanted(at_old)) return;
   if (at_new.is_null() && at_old.is_null()) {
     create(newer, older, geometry, pair);
@@ -177,25 +182,23 @@ void LandmarkMaker::consume(KeyframeHandle newer, KeyframeHandle older, const Pa
   }
 }
 
-void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& g,
-                           const Pair& pair) {
-  const Keyframe& k_new = map_.keyframes()[newer];
-  const Keyframe& k_old = map_.keyframes()[older];
-  const Eigen::Vector3d f_new = k_new.bearings[pair.feature_new].cast<double>();
-  const Eigen::Vector3d f_old = k_old.bearings[pair.feature_old].cast<double>();
+void LandmarkMaker::create(Observer newer, Observer older, const PairGeometry& g, const Pair& pair) {
+  const Keyframe& k_new = map_.keyframes()[newer.keyframe];
+  const Eigen::Vector3d f_new = view_of(newer).bearings[pair.feature_new].cast<double>();
+  const Eigen::Vector3d f_old = view_of(older).bearings[pair.feature_old].cast<double>();
   const InverseDepth first = triangulate_inverse_depth(f_old, g.T_new_old, f_new);
   const double parallax_rad = parallax_angle(g.T_new_old.q * f_old, f_new);
   const bool baseline = config_.landmarks.mode == LandmarkMode::kBaseline;
   if (baseline && (parallax_rad < config_.landmarks.promote_parallax_rad || !first.ok)) return;
 
-  const LandmarkHandle handle = map_.add_landmark(older, pair.feature_old);
+  const LandmarkHandle handle = map_.add_landmark(older.keyframe, older.camera, pair.feature_old);
   if (handle.is_null()) return;
   Landmark& l = map_.landmarks()[handle];
   l.inverse_depth = first.ok ? std::max(0.0, first.inverse_depth) : 0.0;
   l.created_keyframe = k_new.id;
   l.created_utime = k_new.utime;
   Observation o;
-  if (!measure_observation(config_, map_, l, newer, pair.feature_new, &o) ||
+  if (!measure_observation(config_, map_, l, newer.keyframe, newer.camera, pair.feature_new, &o) ||
       !map_.add_observation(handle, o)) {
     map_.remove_landmark(handle);
     return;
@@ -210,10 +213,11 @@ void LandmarkMaker::create(KeyframeHandle newer, KeyframeHandle older, const Pai
     ++counts_.vmp_made;
 }
 
-void LandmarkMaker::attach(LandmarkHandle handle, KeyframeHandle keyframe, std::size_t feature) {
+void LandmarkMaker::attach(LandmarkHandle handle, Observer observer, std::size_t feature) {
   const Landmark& l = map_.landmarks()[handle];
   Observation o;
-  if (!measure_observation(config_, map_, l, keyframe, feature, &o) || !map_.add_observation(handle, o))
+  if (!measure_observation(config_, map_, l, observer.keyframe, observer.camera, feature, &o) ||
+      !map_.add_observation(handle, o))
     return;
   ++counts_.vmp_attached;
   try_promote(handle, true);
@@ -230,9 +234,10 @@ void LandmarkMaker::merge(LandmarkHandle into, LandmarkHandle from) {
   const Landmark source = map_.landmarks()[from];
   std::vector<Observation> moved;
   for (const Observation& o : source.observations) {
-    if (o.feature < 0 || Map::find_observation(map_.landmarks()[into], o.keyframe) != nullptr) continue;
+    if (o.feature < 0 || Map::find_observation(map_.landmarks()[into], o.keyframe, o.camera) != nullptr)
+      continue;
     Observation measured;
-    if (!measure_observation(config_, map_, map_.landmarks()[into], o.keyframe,
+    if (!measure_observation(config_, map_, map_.landmarks()[into], o.keyframe, o.camera,
                              static_cast<std::size_t>(o.feature), &measured))
       return;
     moved.push_back(measured);
@@ -256,8 +261,8 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
   for (const Observation& o : l.observations) {
     if (o.sigma_px <= 0.0F) continue;
     const Keyframe& k = map_.keyframes()[o.keyframe];
-    const RigCamera& camera = map_.rig().cameras[static_cast<std::size_t>(k.camera)];
-    views.push_back({&camera.camera, map_.T_world_camera(k).inverse() * T_world_anchor, &o});
+    views.push_back(
+        {&map_.camera(o.camera).camera, map_.T_world_camera(k, o.camera).inverse() * T_world_anchor, &o});
   }
   // Start from the best pair, then Gauss-Newton on the one unknown.
   double rho = l.inverse_depth;
@@ -283,7 +288,7 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
                               kPoseSigma_px * kPoseSigma_px;
       if (!v.camera->project(p, &pixel, &J)) {
         fit.max_chi2 = 1e9;
-        fit.worst = v.observation->keyframe;
+        fit.worst = {v.observation->keyframe, v.observation->camera};
         continue;
       }
       const Eigen::Vector2d r = pixel - v.observation->pixel.cast<double>();
@@ -291,7 +296,8 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
       information += d.squaredNorm() / variance;
       gradient += d.dot(r) / variance;
       const double chi2 = r.squaredNorm() / variance;
-      if (chi2 > fit.max_chi2) fit.max_chi2 = chi2, fit.worst = v.observation->keyframe;
+      if (chi2 > fit.max_chi2)
+        fit.max_chi2 = chi2, fit.worst = {v.observation->keyframe, v.observation->camera};
     }
     if (information <= 0.0) return fit;
     const double step = -gradient / information;
@@ -325,17 +331,30 @@ bool LandmarkMaker::found_elsewhere(const Landmark& l) const {
     const bool certain = kFoundOneIn * found >= asked + more;
     if (more == 0 || certain || kFoundOneIn * (found + more) < asked + more) break;
     const Keyframe* k = map_.keyframes().get(witness);
-    if (k == nullptr || !k->image || Map::find_observation(l, witness) != nullptr) continue;
-    const Camera& camera = map_.rig().cameras[static_cast<std::size_t>(k->camera)].camera;
-    Prediction p;
-    if (!predict(input, camera, map_.T_world_camera(*k).inverse(), kWitnessBorder_px, &p)) continue;
-    if (p.scale_change < kMinWitnessScale || p.scale_change > kMaxWitnessScale) continue;
+    if (k == nullptr || Map::find_observation(l, witness) != nullptr) continue;
+    const std::optional<bool> answer = shows(*k, l, input);
+    if (!answer) continue;
     ++asked;
-    const float search_px =
-        kWitnessSearch_level_px * std::max(1.0F, level_scale_[l.host_level] * p.scale_change);
-    if (k->image->align(l.patch, p.A_target_host, p.pixel.cast<float>(), search_px).ok) ++found;
+    if (*answer) ++found;
   }
   return kFoundOneIn * found >= asked;
+}
+
+std::optional<bool> LandmarkMaker::shows(const Keyframe& witness, const Landmark& l,
+                                         const PredictionInput& input) const {
+  for (int c = 0; c < witness.views.size(); ++c) {
+    const KeyframeView& view = witness.views[c];
+    if (!view.has_pixels()) continue;
+    Prediction p;
+    if (!predict(input, map_.camera(c).camera, map_.T_world_camera(witness, c).inverse(), kWitnessBorder_px,
+                 &p))
+      continue;
+    if (p.scale_change < kMinWitnessScale || p.scale_change > kMaxWitnessScale) continue;
+    const float search_px =
+        kWitnessSearch_level_px * std::max(1.0F, level_scale_[l.host_level] * p.scale_change);
+    return view.image->align(l.patch, p.A_target_host, p.pixel.cast<float>(), search_px).ok;
+  }
+  return std::nullopt;
 }
 
 void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
@@ -347,7 +366,7 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
     if (l.failures >= kMaxFailures || l.observations.size() <= 2) {
       map_.remove_landmark(handle);
       if (through_vmp) ++counts_.vmp_rejected;
-    } else if (!map_.remove_observation(handle, fit.worst) && through_vmp) {
+    } else if (!map_.remove_observation(handle, fit.worst.keyframe, fit.worst.camera) && through_vmp) {
       ++counts_.vmp_rejected;
     }
     return;
@@ -361,7 +380,7 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   // Size in the images against size by depth.
   const Observation& newest = l.observations.back();
   const Keyframe& k = map_.keyframes()[newest.keyframe];
-  const SE3 T_camera_anchor = map_.T_world_camera(k).inverse() * map_.T_world_anchor(l);
+  const SE3 T_camera_anchor = map_.T_world_camera(k, newest.camera).inverse() * map_.T_world_anchor(l);
   const double scale_change =
       1.0 / (T_camera_anchor.q * l.bearing + l.inverse_depth * T_camera_anchor.t).norm();
   const double seen_change = std::pow(config_.pyramid.scale_factor, newest.level - l.host_level);

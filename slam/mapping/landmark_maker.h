@@ -3,10 +3,12 @@
 // landmarks of state `bearing`) that wait for parallax where it does not.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "slam/config.h"
 #include "slam/map/map.h"
+#include "slam/map/predict.h"
 #include "slam/mapping/counts.h"
 #include "slam/mapping/epipolar_index.h"
 
@@ -16,8 +18,8 @@ class LandmarkMaker {
  public:
   LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts);
 
-  // Pairs the new keyframe with up to config.mapping.neighbours others, and makes, feeds and promotes
-  // landmarks.
+  // Pairs each camera of the new keyframe with the same camera of its neighbours: makes landmarks, adds
+  // observations and promotes.
   void process(KeyframeHandle newer, const std::vector<KeyframeHandle>& neighbours);
   // A VMP that tracking has seen once more: promotes it where that was what it lacked.
   void reconsider(LandmarkHandle handle);
@@ -29,7 +31,7 @@ class LandmarkMaker {
   struct DepthFit {
     bool ok = false;
     double inverse_depth = 0, sigma = 0, max_chi2 = 0;
-    KeyframeHandle worst;
+    Observer worst;
   };
   [[nodiscard]] DepthFit fit_depth(const Landmark& landmark) const;
 
@@ -47,16 +49,16 @@ class LandmarkMaker {
     bool valid = false;
   };
 
-  [[nodiscard]] PairGeometry relate(const Keyframe& newer, const Keyframe& older) const;
-  void find_pairs(const Keyframe& newer, const Keyframe& older, const PairGeometry& geometry,
-                  std::vector<Pair>* out);
+  void pair_views(Observer newer, Observer older);
+  [[nodiscard]] PairGeometry relate(Observer newer, Observer older) const;
+  void find_pairs(Observer newer, Observer older, const PairGeometry& geometry, std::vector<Pair>* out);
   // The epipolar segment of a feature from infinity to the nearest depth, in pixels of the other keyframe.
   // False where nothing of it can be seen there.
   static bool epipolar_segment(const Eigen::Vector3f& bearing_new, const Camera& camera_old,
                                const PairGeometry& geometry, Eigen::Vector2d* far, Eigen::Vector2d* near);
-  void consume(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
-  void create(KeyframeHandle newer, KeyframeHandle older, const PairGeometry& geometry, const Pair& pair);
-  void attach(LandmarkHandle handle, KeyframeHandle keyframe, std::size_t feature);
+  void consume(Observer newer, Observer older, const PairGeometry& geometry, const Pair& pair);
+  void create(Observer newer, Observer older, const PairGeometry& geometry, const Pair& pair);
+  void attach(LandmarkHandle handle, Observer observer, std::size_t feature);
   void merge(LandmarkHandle into, LandmarkHandle from);
   void try_promote(LandmarkHandle handle, bool through_vmp);
   [[nodiscard]] bool enough_information(const Landmark& landmark, const DepthFit& fit) const;
@@ -67,7 +69,13 @@ class LandmarkMaker {
   // sigma. But where such a point would have to be in a third image, it is not. True also where no other
   // keyframe should show it.
   [[nodiscard]] bool found_elsewhere(const Landmark& landmark) const;
+  // Whether the patch is found in the first view of the keyframe that should show it; null where none should.
+  [[nodiscard]] std::optional<bool> shows(const Keyframe& witness, const Landmark& landmark,
+                                          const PredictionInput& input) const;
   [[nodiscard]] bool wanted(LandmarkHandle handle) const;
+  [[nodiscard]] const KeyframeView& view_of(Observer observer) const {
+    return map_.keyframes()[observer.keyframe].views[observer.camera];
+  }
 
   const EstimatorConfig& config_;
   Map& map_;

@@ -12,6 +12,8 @@ namespace {
 
 // The first adjustment of a map starts further from its optimum than later ones.
 constexpr int kFirstIterations = 20;
+// The camera whose calibration is refined.
+constexpr int kRefinedCamera = 0;
 
 MapOptions map_options(const EstimatorConfig& config) {
   MapOptions options;
@@ -35,7 +37,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
       window_(config_, &map_, &counts_),
       solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
               static_cast<std::size_t>(config.mapping.window_sightings)),
-      calibrator_(config.calibration, rig.cameras.front().camera),
+      calibrator_(config.calibration, rig.cameras[kRefinedCamera].camera, kRefinedCamera),
       view_builder_(config_, &map_) {
   if (config.mapping.solver == "ceres" && config.mapping.solve_instead == nullptr)
     throw std::invalid_argument("mapping.solver: ceres: no solver was given with it");
@@ -66,13 +68,13 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
 
 void Mapper::add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second) {
   for (const InitialPoint& p : pair.points)
-    if (add_initial_landmark(p, first, second)) ++counts_.landmarks_made;
+    if (add_initial_landmark(p, {first, pair.camera}, {second, pair.camera})) ++counts_.landmarks_made;
 }
 
-bool Mapper::add_initial_landmark(const InitialPoint& point, KeyframeHandle first, KeyframeHandle second) {
-  const LandmarkHandle handle = map_.add_landmark(first, point.feature_first);
+bool Mapper::add_initial_landmark(const InitialPoint& point, Observer first, Observer second) {
+  const LandmarkHandle handle = map_.add_landmark(first.keyframe, first.camera, point.feature_first);
   if (handle.is_null()) return false;
-  const Keyframe& k2 = map_.keyframes()[second];
+  const Keyframe& k2 = map_.keyframes()[second.keyframe];
   Landmark& l = map_.landmarks()[handle];
   l.inverse_depth = point.inverse_depth;
   l.state = LandmarkState::kFull;
@@ -81,7 +83,7 @@ bool Mapper::add_initial_landmark(const InitialPoint& point, KeyframeHandle firs
   const Eigen::Vector4d w = map_.world_point(l);
   l.creation_depth = (w.head<3>() / w[3] - k2.T_world_body.t).norm();
   Observation o;
-  if (measure_observation(config_, map_, l, second, point.feature_second, &o) &&
+  if (measure_observation(config_, map_, l, second.keyframe, second.camera, point.feature_second, &o) &&
       map_.add_observation(handle, o))
     return true;
   map_.remove_landmark(handle);
@@ -133,7 +135,8 @@ std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) 
 void Mapper::attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request) {
   for (const Sighting& s : request.sightings) {
     if (!map_.landmarks().contains(s.landmark)) continue;
-    if (map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px}))
+    const auto camera = static_cast<std::uint8_t>(s.camera);
+    if (map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px, 0, camera}))
       landmark_maker_.reconsider(s.landmark);
   }
   for (const SightingCount& c : request.counts)
@@ -196,8 +199,9 @@ void Mapper::refine_calibration() {
   const StageSpan span(listener_, Stage::kCalibration);
   // Poses and depths are at their optimum for the present calibration: the residuals hold noise and the
   // calibration's error.
-  const auto d_bearing = window_.bearing_derivatives();
-  if (calibrator_.update(window_.problem(), d_bearing)) map_.set_camera(0, calibrator_.camera());
+  const auto d_bearing = window_.bearing_derivatives(calibrator_.camera_index());
+  if (calibrator_.update(window_.problem(), d_bearing))
+    map_.set_camera(calibrator_.camera_index(), calibrator_.camera());
   counts_.calibration_contradicted = calibrator_.contradicts_given();
 }
 

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
+#include "slam/map/request.h"
 #include "slam/mapping/calibrator.h"
 #include "slam/mapping/counts.h"
 #include "slam/mapping/duplicates.h"
@@ -58,8 +58,7 @@ class Mapper {
 
  private:
   void add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second);
-  [[nodiscard]] bool add_initial_landmark(const InitialPoint& point, KeyframeHandle first,
-                                          KeyframeHandle second);
+  [[nodiscard]] bool add_initial_landmark(const InitialPoint& point, Observer first, Observer second);
   [[nodiscard]] std::size_t count_landmarks(std::int32_t map_id) const;
   void note_creation_sigmas(std::int32_t map_id);
   void attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& request);

@@ -38,18 +38,20 @@ PredictionInput AnchorMemory::prediction_input(const Map& map, const Landmark& l
 }
 
 bool measure_observation(const EstimatorConfig& config, const Map& map, const Landmark& landmark,
-                         KeyframeHandle handle, std::size_t feature, Observation* out) {
+                         KeyframeHandle handle, int camera, std::size_t feature, Observation* out) {
   const Keyframe& keyframe = map.keyframes()[handle];
-  if (!keyframe.image) return false;
-  const Camera& camera = map.rig().cameras[static_cast<std::size_t>(keyframe.camera)].camera;
-  const Feature& f = keyframe.set.features[feature];
+  const KeyframeView& view = keyframe.views[camera];
+  if (!view.has_pixels()) return false;
+  const Feature& f = view.set.features[feature];
   const auto scale = static_cast<float>(std::pow(config.pyramid.scale_factor, f.level));
-  *out = {handle, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, scale};
+  *out = {handle,  static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, scale,
+          f.level, static_cast<std::uint8_t>(camera)};
   Prediction p;
-  if (!predict(prediction_input(map, landmark), camera, map.T_world_camera(keyframe).inverse(), 0.0, &p))
+  if (!predict(prediction_input(map, landmark), map.camera(camera).camera,
+               map.T_world_camera(keyframe, camera).inverse(), 0.0, &p))
     return false;
   const Alignment a =
-      keyframe.image->align(landmark.patch, p.A_target_host, out->pixel, kSearchLevelPixels * scale);
+      view.image->align(landmark.patch, p.A_target_host, out->pixel, kSearchLevelPixels * scale);
   if (!a.ok) return false;
   out->pixel = a.pixel;
   out->sigma_px = std::hypot(a.sigma_px, static_cast<float>(config.tracking.pixel_sigma_px));

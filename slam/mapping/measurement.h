@@ -10,11 +10,11 @@
 
 namespace farpoint::slam {
 
-// Aligns the landmark's patch with the keyframe's image, from corner `feature`. False where the keyframe has
-// no pixels any more or the patch is not there; *out then says nothing.
+// Aligns the landmark's patch with the image of one camera of the keyframe, from corner `feature`. False
+// where that view has no pixels or the patch is not there; *out is then undefined.
 [[nodiscard]] bool measure_observation(const EstimatorConfig& config, const Map& map,
-                                       const Landmark& landmark, KeyframeHandle handle, std::size_t feature,
-                                       Observation* out);
+                                       const Landmark& landmark, KeyframeHandle keyframe, int camera,
+                                       std::size_t feature, Observation* out);
 
 // What predict() needs of a landmark.
 [[nodiscard]] PredictionInput prediction_input(const Map& map, const Landmark& landmark);

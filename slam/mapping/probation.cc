@@ -6,11 +6,12 @@ namespace farpoint::slam {
 
 void Probation::admit_made_at(KeyframeHandle keyframe) {
   const Keyframe& k = map_.keyframes()[keyframe];
-  for (const LandmarkHandle& h : k.landmarks) {
-    const Landmark* l = map_.landmarks().get(h);
-    if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == k.id)
-      landmarks_.push_back(h);
-  }
+  for (int c = 0; c < k.views.size(); ++c)
+    for (const LandmarkHandle& h : k.views[c].landmarks) {
+      const Landmark* l = map_.landmarks().get(h);
+      if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == k.id)
+        landmarks_.push_back(h);
+    }
 }
 
 bool Probation::fails(const Landmark& landmark, std::uint64_t age_keyframes) {

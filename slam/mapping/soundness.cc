@@ -48,7 +48,8 @@ Eigen::Vector3d place_of(const BundleProblem& problem, const BundleProblem::Meas
 double coherence_of(const BundleProblem& problem) {
   BundleFrames frames;
   frames.update(problem);
-  std::vector<Field> fields(problem.poses.size());
+  const std::size_t cameras = problem.rig->cameras.size();
+  std::vector<Field> fields(problem.poses.size() * cameras);  // one an image
   for (const BundleProblem::Point& point : problem.points) {
     const BundleFrames::WorldPoint world = frames.world_point(point);
     for (int i = 0; i < point.measurements; ++i) {
@@ -59,7 +60,8 @@ double coherence_of(const BundleProblem& problem) {
       if (m.pose == point.host || problem.poses[pose].fixed || m.chi2 > kChi2TwoDof) continue;
       Eigen::Vector2d residual;
       if (residual_world(world, frames.view(m), m, &residual))
-        fields[pose].add(place_of(problem, m), residual, point.weight);
+        fields[pose * cameras + static_cast<std::size_t>(m.camera)].add(place_of(problem, m), residual,
+                                                                        point.weight);
     }
   }
   double sum = 0.0;

@@ -75,7 +75,6 @@ void ViewBuilder::begin(KeyframeHandle reference, bool settled, LocalView* view)
   view->map_keyframes = 0;
   map_.keyframes().for_each(
       [&](KeyframeHandle, const Keyframe& k) { view->map_keyframes += k.map_id == centre.map_id; });
-  T_reference_world_ = map_.T_world_camera(centre).inverse();
 }
 
 void ViewBuilder::add_keyframe(KeyframeHandle keyframe) {
@@ -95,7 +94,15 @@ void ViewBuilder::select_keyframes(KeyframeHandle reference) {
 }
 
 void ViewBuilder::add_landmarks(KeyframeHandle keyframe, bool is_reference, LocalView* view) {
-  for (const LandmarkHandle& lh : map_.keyframes()[keyframe].landmarks) {
+  const Keyframe& k = map_.keyframes()[keyframe];
+  for (int c = 0; c < k.views.size(); ++c) {
+    if (is_reference) T_reference_world_ = map_.T_world_camera(k, c).inverse();
+    add_landmarks_of(k.views[c], is_reference, view);
+  }
+}
+
+void ViewBuilder::add_landmarks_of(const KeyframeView& keyframe_view, bool is_reference, LocalView* view) {
+  for (const LandmarkHandle& lh : keyframe_view.landmarks) {
     const Landmark* l = map_.landmarks().get(lh);
     if (l == nullptr || !guides_tracking(*l) || is_taken_[lh.index] != 0) continue;
     // The most covisible keyframes come first: a full view lacks the landmarks of the least covisible ones.

@@ -40,6 +40,7 @@ class ViewBuilder {
   void select_keyframes(KeyframeHandle reference);
   void add_keyframe(KeyframeHandle keyframe);
   void add_landmarks(KeyframeHandle keyframe, bool is_reference, LocalView* view);
+  void add_landmarks_of(const KeyframeView& keyframe_view, bool is_reference, LocalView* view);
   [[nodiscard]] ViewLandmark make_landmark(LandmarkHandle handle, const Landmark& landmark);
   // Distance and nearness of a landmark that the reference sees.
   void measure_in_reference(ViewLandmark* landmark, LocalView* view);
@@ -52,7 +53,7 @@ class ViewBuilder {
   std::uint64_t sequence_ = 0;  // of the last view
   // Work space of one view.
   AnchorMemory anchors_;
-  SE3 T_reference_world_;  // the reference's camera
+  SE3 T_reference_world_;  // the camera of the reference whose landmarks are added
   std::vector<KeyframeHandle> keyframes_;
   std::vector<std::uint8_t> is_member_, is_taken_;  // by keyframe slot, by landmark slot
   std::vector<double> depths_;                      // of the reference's landmarks, map units

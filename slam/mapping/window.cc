@@ -67,16 +67,22 @@ void Window::select_keyframes(KeyframeHandle centre) {
 void Window::select_landmarks() {
   landmarks_.clear();
   is_taken_.assign(map_.landmarks().capacity(), 0);
-  for (const KeyframeHandle& h : keyframes_)
-    for (const LandmarkHandle& lh : map_.keyframes()[h].landmarks) {
-      const Landmark* l = map_.landmarks().get(lh);
-      // Virtual points stay outside, as in the paper: a common motion of theirs would pass for one of the
-      // vehicle. On rendered motorways under drifting clouds they doubled the error.
-      if (l == nullptr || l->state == LandmarkState::kBearing || is_taken_[lh.index] != 0) continue;
-      if (landmarks_.size() >= static_cast<std::size_t>(config_.mapping.window_landmarks)) break;
-      is_taken_[lh.index] = 1;
-      landmarks_.push_back(lh);
-    }
+  for (const KeyframeHandle& h : keyframes_) {
+    const Keyframe& k = map_.keyframes()[h];
+    for (int c = 0; c < k.views.size(); ++c) select_landmarks_of(k.views[c]);
+  }
+}
+
+void Window::select_landmarks_of(const KeyframeView& view) {
+  for (const LandmarkHandle& lh : view.landmarks) {
+    const Landmark* l = map_.landmarks().get(lh);
+    // Virtual points stay outside, as in the paper: a common motion of theirs would pass for one of the
+    // vehicle. On rendered motorways under drifting clouds they doubled the error.
+    if (l == nullptr || l->state == LandmarkState::kBearing || is_taken_[lh.index] != 0) continue;
+    if (landmarks_.size() >= static_cast<std::size_t>(config_.mapping.window_landmarks)) return;
+    is_taken_[lh.index] = 1;
+    landmarks_.push_back(lh);
+  }
 }
 
 void Window::fix_observers() {
@@ -131,15 +137,14 @@ void Window::add_point(const Landmark& l) {
     if (!is_measured(o)) continue;
     BundleProblem::Measurement m;
     m.pose = pose_index_[o.keyframe.index];
-    m.camera = map_.keyframes()[o.keyframe].camera;
+    m.camera = o.camera;
     m.pixel = o.pixel.cast<double>();
     m.sigma_px = o.sigma_px;
     problem_.measurements.push_back(m);
   }
   point.measurements = static_cast<int>(problem_.measurements.size()) - point.first_measurement;
   if (point.measurements == 0) return;
-  const double own_motion_px =
-      kOwnMotion_rad * map_.rig().cameras[static_cast<std::size_t>(l.host_camera)].camera.focal_px();
+  const double own_motion_px = kOwnMotion_rad * map_.camera(l.host_camera).camera.focal_px();
   point.weight = shared_error_weight(problem_, point, map_.is_wide(l) ? kPatchSigma_px : own_motion_px);
   problem_.points.push_back(point);
 }
@@ -177,21 +182,22 @@ void Window::remove_outliers(LandmarkHandle handle, const BundleProblem::Point& 
   for (const Observation& o : map_.landmarks()[handle].observations) {
     if (!is_measured(o)) continue;
     const auto& m = problem_.measurements[static_cast<std::size_t>(index++)];
-    if (m.chi2 > kChi2TwoDof) outliers_.push_back(o.keyframe);
+    if (m.chi2 > kChi2TwoDof) outliers_.push_back({o.keyframe, o.camera});
   }
   bool alive = true;
-  for (const KeyframeHandle& k : outliers_) alive = alive && map_.remove_observation(handle, k);
+  for (const Observer& o : outliers_) alive = alive && map_.remove_observation(handle, o.keyframe, o.camera);
   if (!alive) ++counts_.landmarks_culled;
 }
 
-std::vector<Eigen::Matrix<double, 3, 2>> Window::bearing_derivatives() {
+std::vector<Eigen::Matrix<double, 3, 2>> Window::bearing_derivatives(int camera) {
   std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(problem_.points.size(),
                                                      Eigen::Matrix<double, 3, 2>::Zero());
   for (std::size_t i = 0; i < problem_.points.size(); ++i) {
-    if (const Landmark* l = map_.landmarks().get(landmarks_[i]))
-      d_bearing[i] = l->d_bearing_d_pixel;
-    else
+    const Landmark* l = map_.landmarks().get(landmarks_[i]);
+    if (l == nullptr)
       problem_.points[i].measurements = 0;
+    else if (l->host_camera == camera)
+      d_bearing[i] = l->d_bearing_d_pixel;
   }
   return d_bearing;
 }

@@ -35,15 +35,16 @@ class Window {
   // Precondition: the map has not changed since build().
   std::optional<double> take_back();
 
-  // By point: derivative of the bearing by the host pixel, anchor axes. Takes the measurements from points
-  // whose landmark take_back() removed.
-  [[nodiscard]] std::vector<Eigen::Matrix<double, 3, 2>> bearing_derivatives();
+  // By point: derivative of the bearing by the host pixel, anchor axes; zero where another camera is the
+  // anchor. Takes the measurements from points whose landmark take_back() removed.
+  [[nodiscard]] std::vector<Eigen::Matrix<double, 3, 2>> bearing_derivatives(int camera);
 
   [[nodiscard]] std::size_t bytes() const { return problem_.bytes(); }
 
  private:
   void select_keyframes(KeyframeHandle centre);
   void select_landmarks();
+  void select_landmarks_of(const KeyframeView& view);
   void add_pose(KeyframeHandle keyframe, bool fixed);
   void fix_observers();
   void fix_oldest();
@@ -66,7 +67,8 @@ class Window {
   // Work space.
   std::vector<std::uint8_t> is_taken_;  // by landmark slot
   std::vector<int> uses_;               // by keyframe slot
-  std::vector<KeyframeHandle> observers_, outliers_;
+  std::vector<KeyframeHandle> observers_;
+  std::vector<Observer> outliers_;
   std::vector<double> scale_changes_;
 };
 

@@ -20,7 +20,8 @@ constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
 
 }  // namespace
 
-Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig) : config_(config), rig_(rig) {
+Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig, int camera)
+    : config_(config), camera_(camera), rig_camera_(rig.cameras[static_cast<std::size_t>(camera)]) {
   history_.reserve(kHistoryFrames + 1);
 }
 
@@ -39,7 +40,7 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   reference_ = std::move(frame);
   most_matches_ = 0;
   expected_px_.clear();
-  for (const Feature& f : reference_->set.features) expected_px_.emplace_back(f.u_px, f.v_px);
+  for (const Feature& f : view_of(*reference_).set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
 
 // Only a frame about half way between the reference and now can be the next reference. What is older never
@@ -47,20 +48,20 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
 void Initialiser::forget_pixels(std::uint64_t age) {
   const std::uint64_t half = reference_->number + (age + 1) / 2;
   for (const std::shared_ptr<Frame>& f : history_)
-    if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->image.reset();
+    if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->drop_pixels();
 }
 
 void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
   out->clear();
-  const Camera& camera = rig_.cameras[static_cast<std::size_t>(frame.camera)].camera;
-  const float radius_px = kFirstWindow * static_cast<float>(camera.width_px());
-  std::vector<std::int32_t> owner(frame.set.features.size(), -1);
-  std::vector<int> owner_distance(frame.set.features.size(), 257);
-  std::vector<std::int32_t> found(reference_->set.features.size(), -1);
-  for (std::size_t i = 0; i < reference_->set.features.size(); ++i) {
-    const Feature& f = reference_->set.features[i];
+  const float radius_px = kFirstWindow * static_cast<float>(rig_camera_.camera.width_px());
+  const FrameView &first = view_of(*reference_), &second = view_of(frame);
+  std::vector<std::int32_t> owner(second.set.features.size(), -1);
+  std::vector<int> owner_distance(second.set.features.size(), 257);
+  std::vector<std::int32_t> found(first.set.features.size(), -1);
+  for (std::size_t i = 0; i < first.set.features.size(); ++i) {
+    const Feature& f = first.set.features[i];
     DescriptorQuery q;
-    q.descriptor = reference_->set.descriptors[i];
+    q.descriptor = first.set.descriptors[i];
     q.u_px = expected_px_[i].x();
     q.v_px = expected_px_[i].y();
     q.radius_px = radius_px;
@@ -70,7 +71,7 @@ void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
     q.ratio = 0.85F;
     int distance = 0;
     const int j = find_descriptor(
-        frame.set, frame.grid, q, [](std::size_t) { return true; }, &distance);
+        second.set, second.grid, q, [](std::size_t) { return true; }, &distance);
     if (j < 0) continue;
     const auto ju = static_cast<std::size_t>(j);
     if (distance >= owner_distance[ju]) continue;
@@ -83,18 +84,18 @@ void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
     if (found[i] < 0) continue;
     const auto j = static_cast<std::size_t>(found[i]);
     out->push_back({i, j});
-    expected_px_[i] = {frame.set.features[j].u_px, frame.set.features[j].v_px};
+    expected_px_[i] = {second.set.features[j].u_px, second.set.features[j].v_px};
   }
 }
 
 std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& frame,
                                               const std::vector<Pairing>& pairs) const {
-  const RigCamera& camera = rig_.cameras[static_cast<std::size_t>(frame->camera)];
+  const RigCamera& camera = rig_camera_;
   std::vector<Eigen::Vector3d> first, second;
   std::vector<Pairing> used;
   for (const Pairing& p : pairs) {
-    const Feature& a = reference_->set.features[p.feature_first];
-    const Feature& b = frame->set.features[p.feature_second];
+    const Feature& a = view_of(*reference_).set.features[p.feature_first];
+    const Feature& b = view_of(*frame).set.features[p.feature_second];
     Eigen::Vector3d ba, bb;
     if (!camera.camera.unproject({a.u_px, a.v_px}, &ba) || !camera.camera.unproject({b.u_px, b.v_px}, &bb))
       continue;
@@ -116,6 +117,7 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
   InitialPair pair;
   pair.first = reference_;
   pair.second = frame;
+  pair.camera = camera_;
   // T_2_1 is between cameras; with an unknown scale the lever arm to the body is zero by definition
   // (config.h).
   const SE3 T_c1_c2 = r.T_2_1.inverse();
@@ -145,7 +147,7 @@ std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
     // or there is none, this one.
     const std::uint64_t half = reference_->number + (age + 1) / 2;
     const auto next = std::find_if(history_.begin(), history_.end(),
-                                   [&](const auto& f) { return f->number >= half && f->image != nullptr; });
+                                   [&](const auto& f) { return f->number >= half && f->has_pixels(); });
     set_reference(next != history_.end() && age > 1 ? *next : frame);
     match(*frame, &pairs_);
     last_matches_ = static_cast<int>(pairs_.size());

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "slam/config.h"
-#include "slam/map/frame.h"
+#include "slam/map/request.h"
 
 namespace farpoint::slam {
 
@@ -16,7 +16,8 @@ class Initialiser {
   // Frames that are kept to be posed once there is a map.
   static constexpr std::size_t kHistoryFrames = 60;
 
-  Initialiser(const EstimatorConfig& config, const Rig& rig);
+  // `camera`: whose images are used.
+  Initialiser(const EstimatorConfig& config, const Rig& rig, int camera = 0);
 
   // A pair once there is one. The frame joins the history either way.
   std::optional<InitialPair> add(std::shared_ptr<Frame> frame);
@@ -31,6 +32,7 @@ class Initialiser {
   struct Pairing {
     std::size_t feature_first = 0, feature_second = 0;
   };
+  [[nodiscard]] const FrameView& view_of(const Frame& frame) const { return frame.views[camera_]; }
   void set_reference(std::shared_ptr<Frame> frame);
   void forget_pixels(std::uint64_t age);
   void match(const Frame& frame, std::vector<Pairing>* out);
@@ -38,7 +40,8 @@ class Initialiser {
                                    const std::vector<Pairing>& pairs) const;
 
   const EstimatorConfig config_;
-  const Rig rig_;
+  const int camera_;
+  const RigCamera rig_camera_;
   std::vector<std::shared_ptr<Frame>> history_;
   std::shared_ptr<Frame> reference_;
   std::vector<Eigen::Vector2f> expected_px_;  // where each reference feature was seen last

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "slam/image/descriptor_search.h"
 #include "slam/tracking/work_space.h"
@@ -18,16 +19,18 @@ constexpr float kMaxAlignmentShiftPx = 2.0F;
 
 }  // namespace
 
-Matcher::Matcher(const EstimatorConfig& config) : config_(config.tracking), pyramid_(config.pyramid) {
+Matcher::Matcher(const EstimatorConfig& config, int cameras)
+    : config_(config.tracking), pyramid_(config.pyramid) {
   const auto landmarks = static_cast<std::size_t>(config.capacity.landmarks),
              in_view = static_cast<std::size_t>(config.capacity.view_landmarks),
              features = static_cast<std::size_t>(config.extractor.features);
-  reserve_touched(&candidates_, in_view);
-  reserve_touched(&matches_, features);
-  reserve_touched(&taken_, features);
+  const auto images = static_cast<std::size_t>(cameras);
+  reserve_touched(&candidates_, images * in_view);
+  reserve_touched(&matches_, images * features);
+  reserve_touched(&taken_, images * features);
   reserve_touched(&seen_, in_view);
-  reserve_touched(&matched_, in_view);
-  reserve_touched(&candidate_of_, in_view);
+  reserve_touched(&matched_, images * in_view);
+  reserve_touched(&candidate_of_, images * in_view);
   view_index_of_slot_.assign(landmarks, 0);
   for (int l = 0; l < pyramid_.levels; ++l) level_scale_.push_back(std::pow(pyramid_.scale_factor, l));
 }
@@ -56,16 +59,25 @@ void Matcher::mark_seen(std::span<const LandmarkHandle> seen) {
 }
 
 void Matcher::begin(const Frame& frame) {
-  taken_.assign(frame.set.features.size(), 0);
+  features_ = 0;
+  for (int c = 0; c < frame.views.size(); ++c)
+    features_ = std::max(features_, frame.views[c].set.features.size());
+  taken_.assign(static_cast<std::size_t>(frame.views.size()) * features_, 0);
   matches_.clear();
 }
 
 void Matcher::project(const Frame& frame, const SE3& T_world_body, LandmarkSubset subset) {
   const StageSpan span(listener_, Stage::kMatching);
   candidates_.clear();
-  const RigCamera& camera = camera_of(frame);
-  const Predictor predictor(camera.camera, (T_world_body * camera.T_body_camera).inverse());
+  for (int c = 0; c < frame.views.size(); ++c)
+    if (!frame.views[c].set.features.empty()) project_into(c, T_world_body, subset);
+}
+
+void Matcher::project_into(int index, const SE3& T_world_body, LandmarkSubset subset) {
+  const RigCamera& rig_camera = camera(index);
+  const Predictor predictor(rig_camera.camera, (T_world_body * rig_camera.T_body_camera).inverse());
   MatchCandidate c;
+  c.camera = index;
   for (std::size_t i = 0; i < view_->landmarks.size(); ++i) {
     if (!in_subset(i, subset)) continue;
     const ViewLandmark& l = view_->landmarks[i];
@@ -78,9 +90,11 @@ void Matcher::project(const Frame& frame, const SE3& T_world_body, LandmarkSubse
   }
 }
 
-Match Matcher::make_match(const Frame& frame, std::uint32_t view_index, std::int32_t feature) const {
-  const Feature& f = frame.set.features[static_cast<std::size_t>(feature)];
+Match Matcher::make_match(const Frame& frame, std::uint32_t view_index, int camera,
+                          std::int32_t feature) const {
+  const Feature& f = frame.views[camera].set.features[static_cast<std::size_t>(feature)];
   Match m;
+  m.camera = static_cast<std::uint8_t>(camera);
   m.view_index = view_index;
   m.feature = feature;
   m.pixel = {f.u_px, f.v_px};
@@ -92,11 +106,11 @@ Match Matcher::make_match(const Frame& frame, std::uint32_t view_index, std::int
 int Matcher::match(const Frame& frame, double radius_px, float ratio) {
   const StageSpan span(listener_, Stage::kMatching);
   int found = 0;
-  matched_.assign(view_->landmarks.size(), 0);
-  for (const Match& m : matches_) matched_[m.view_index] = 1;
+  matched_.assign(slot(frame.views.size(), 0), 0);
+  for (const Match& m : matches_) matched_[slot(m.camera, m.view_index)] = 1;
   for (const MatchCandidate& c : candidates_) {
     const ViewLandmark& l = view_->landmarks[c.view_index];
-    if (matched_[c.view_index] != 0) continue;
+    if (matched_[slot(c.camera, c.view_index)] != 0) continue;
     const double depth_px = std::min(
         kMostDepthPx, kDepthSigmas * c.prediction.d_pixel_d_inverse_depth.norm() * l.inverse_depth_sigma);
     DescriptorQuery q;
@@ -108,45 +122,47 @@ int Matcher::match(const Frame& frame, double radius_px, float ratio) {
     q.max_level = c.level + 1;
     q.max_hamming = config_.max_hamming;
     q.ratio = ratio;
+    const FrameView& image = frame.views[c.camera];
+    const std::uint8_t* taken_here = &taken(c.camera, 0);
     const int feature =
-        find_descriptor(frame.set, frame.grid, q, [&](std::size_t f) { return taken_[f] == 0; });
+        find_descriptor(image.set, image.grid, q, [&](std::size_t f) { return taken_here[f] == 0; });
     if (feature < 0) continue;
-    taken_[static_cast<std::size_t>(feature)] = 1;
-    matches_.push_back(make_match(frame, c.view_index, feature));
+    taken(c.camera, feature) = 1;
+    matches_.push_back(make_match(frame, c.view_index, c.camera, feature));
     ++found;
   }
   return found;
 }
 
-void Matcher::add(const Frame& frame, std::uint32_t view_index, std::int32_t feature) {
-  std::uint8_t& taken = taken_[static_cast<std::size_t>(feature)];
-  if (taken != 0) return;
-  taken = 1;
-  matches_.push_back(make_match(frame, view_index, feature));
+void Matcher::add(const Frame& frame, std::uint32_t view_index, int camera, std::int32_t feature) {
+  if (std::exchange(taken(camera, feature), std::uint8_t{1}) != 0) return;
+  matches_.push_back(make_match(frame, view_index, camera, feature));
 }
 
 void Matcher::align(const Frame& frame) {
-  if (!frame.image) return;
+  if (!frame.has_pixels()) return;
   const StageSpan span(listener_, Stage::kAlignment);
-  candidate_of_.assign(view_->landmarks.size(), -1);
+  candidate_of_.assign(slot(frame.views.size(), 0), -1);
   for (std::size_t i = 0; i < candidates_.size(); ++i)
-    candidate_of_[candidates_[i].view_index] = static_cast<std::int32_t>(i);
+    candidate_of_[slot(candidates_[i].camera, candidates_[i].view_index)] = static_cast<std::int32_t>(i);
   std::size_t kept = 0;
   for (Match m : matches_) {
-    const std::int32_t candidate = candidate_of_[m.view_index];
+    const std::int32_t candidate = candidate_of_[slot(m.camera, m.view_index)];
     if (candidate < 0) continue;
     if (align_one(frame, candidates_[static_cast<std::size_t>(candidate)].prediction, &m))
       matches_[kept++] = m;
     else
-      taken_[static_cast<std::size_t>(m.feature)] = 0;
+      taken(m.camera, m.feature) = 0;
   }
   matches_.resize(kept);
 }
 
 bool Matcher::align_one(const Frame& frame, const Prediction& prediction, Match* match) const {
-  const Feature& f = frame.set.features[static_cast<std::size_t>(match->feature)];
+  const FrameView& image = frame.views[match->camera];
+  if (!image.image) return true;  // this camera's pixels are not kept
+  const Feature& f = image.set.features[static_cast<std::size_t>(match->feature)];
   const auto level_scale = static_cast<float>(level_scale_[f.level]);
-  const Alignment a = frame.image->align(landmark_of(*match).patch, prediction.A_target_host,
+  const Alignment a = image.image->align(landmark_of(*match).patch, prediction.A_target_host,
                                          {f.u_px, f.v_px}, kMaxAlignmentShiftPx * level_scale);
   if (!a.ok) return false;
   match->pixel = a.pixel;
@@ -161,7 +177,7 @@ void Matcher::drop_outliers() {
     if (m.inlier)
       matches_[kept++] = m;
     else
-      taken_[static_cast<std::size_t>(m.feature)] = 0;
+      taken(m.camera, m.feature) = 0;
   }
   matches_.resize(kept);
 }

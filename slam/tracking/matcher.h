@@ -15,7 +15,7 @@
 
 namespace farpoint::slam {
 
-// A landmark of the view matched to a feature of the frame.
+// A landmark of the view matched to a feature of one camera of the frame.
 struct Match {
   std::uint32_t view_index = 0;  // in LocalView::landmarks
   std::int32_t feature = -1;
@@ -23,11 +23,13 @@ struct Match {
   float sigma_px = 1.0F;                            // its error, level-0 pixels
   bool aligned = false;
   bool inlier = false;
+  std::uint8_t camera = 0;
 };
 
-// A landmark of the view that projects into the frame.
+// A landmark of the view that projects into one camera of the frame.
 struct MatchCandidate {
   std::uint32_t view_index = 0;  // in LocalView::landmarks
+  int camera = 0;
   Prediction prediction;
   int level = 0;  // pyramid level on which its corner is expected
 };
@@ -39,13 +41,15 @@ enum class LandmarkSubset : std::uint8_t {
   kAll,
 };
 
-// The matches of one frame. A feature belongs to one match at most, and a landmark to one at most.
+// The matches of one frame, over all its cameras. A feature belongs to one match at most, and a landmark to
+// one a camera at most. Cameras come one after the other in every list.
 //
 // Tracking's thread. Makes no heap call after construction while view and frame keep to the configured
 // capacities. Every index refers to the view of the last set_view(); matching needs a view.
 class Matcher {
  public:
-  explicit Matcher(const EstimatorConfig& config);
+  // `cameras`: of a frame; work space is allocated for as many.
+  explicit Matcher(const EstimatorConfig& config, int cameras = 1);
   void listen(StageListener* listener) { listener_ = listener; }
 
   // Takes another view and forgets which landmarks were seen. Null lets go of the present view.
@@ -57,21 +61,22 @@ class Matcher {
     if (subset == LandmarkSubset::kAll || seen_[view_index] != 0) return true;
     return subset == LandmarkSubset::kRecent && view_->landmarks[view_index].in_reference;
   }
-  // The camera that took the frame, as the view has it calibrated.
-  [[nodiscard]] const RigCamera& camera_of(const Frame& frame) const {
-    return view_->rig.cameras[static_cast<std::size_t>(frame.camera)];
+  // A camera as the view has it calibrated.
+  [[nodiscard]] const RigCamera& camera(int index) const {
+    return view_->rig.cameras[static_cast<std::size_t>(index)];
   }
 
   // Drops all matches; every feature of the frame is free.
   void begin(const Frame& frame);
-  // Replaces the candidates by the landmarks of the subset that a camera at this pose could match.
+  // Replaces the candidates by the landmarks of the subset that the cameras of a body at this pose could
+  // match.
   void project(const Frame& frame, const SE3& T_world_body, LandmarkSubset subset);
   // Matches candidates that have no match with free features, by descriptor. `radius_px`: half width of the
   // window on level 0; it grows with the candidate's level and with the sigma of its depth. `ratio`: of
   // DescriptorQuery. Returns the number of new matches.
   int match(const Frame& frame, double radius_px, float ratio);
-  // Matches a landmark with a feature, unless the feature is taken.
-  void add(const Frame& frame, std::uint32_t view_index, std::int32_t feature);
+  // Matches a landmark with a feature of one camera, unless the feature is taken.
+  void add(const Frame& frame, std::uint32_t view_index, int camera, std::int32_t feature);
   // Measures each match to a fraction of a pixel. Drops a match that does not align or is no candidate, and
   // frees the feature of one that does not align. Without pixels the matches stay as they are.
   void align(const Frame& frame);
@@ -89,7 +94,16 @@ class Matcher {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  [[nodiscard]] Match make_match(const Frame& frame, std::uint32_t view_index, std::int32_t feature) const;
+  void project_into(int camera, const SE3& T_world_body, LandmarkSubset subset);
+  [[nodiscard]] Match make_match(const Frame& frame, std::uint32_t view_index, int camera,
+                                 std::int32_t feature) const;
+  [[nodiscard]] std::uint8_t& taken(int camera, std::int32_t feature) {
+    return taken_[static_cast<std::size_t>(camera) * features_ + static_cast<std::size_t>(feature)];
+  }
+  // Index of a landmark of the view in a list with one part a camera.
+  [[nodiscard]] std::size_t slot(int camera, std::uint32_t view_index) const {
+    return static_cast<std::size_t>(camera) * view_->landmarks.size() + view_index;
+  }
   [[nodiscard]] bool align_one(const Frame& frame, const Prediction& prediction, Match* match) const;
 
   const TrackingConfig config_;
@@ -100,9 +114,10 @@ class Matcher {
 
   std::vector<MatchCandidate> candidates_;
   std::vector<Match> matches_;
-  std::vector<std::uint8_t> taken_;         // one a feature: it belongs to a match
+  std::size_t features_ = 0;                // most of one camera of the frame
+  std::vector<std::uint8_t> taken_;         // one a camera and feature: it belongs to a match
   std::vector<std::uint8_t> seen_;          // one a view landmark
-  std::vector<std::uint8_t> matched_;       // the same; valid within match()
+  std::vector<std::uint8_t> matched_;       // one a camera and view landmark; valid within match()
   std::vector<std::int32_t> candidate_of_;  // the same: index in candidates_, or -1; valid within align()
   // One a landmark slot of the map: index in the view. An entry is valid where the view has the handle there.
   std::vector<std::uint32_t> view_index_of_slot_;

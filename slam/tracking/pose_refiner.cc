@@ -14,9 +14,9 @@ constexpr float kLocalRatio = 0.8F;
 
 }  // namespace
 
-PoseRefiner::PoseRefiner(const EstimatorConfig& config, Matcher* matcher)
+PoseRefiner::PoseRefiner(const EstimatorConfig& config, Matcher* matcher, int cameras)
     : config_(config.tracking), matcher_(*matcher) {
-  const auto features = static_cast<std::size_t>(config.extractor.features);
+  const auto features = static_cast<std::size_t>(cameras * config.extractor.features);
   reserve_touched(&measurements_, features);
   reserve_touched(&motions_px_, features);
 }
@@ -25,7 +25,7 @@ std::size_t PoseRefiner::bytes() const {
   return capacity_bytes(measurements_) + capacity_bytes(motions_px_);
 }
 
-PoseSolution PoseRefiner::solve(const Frame& frame, const SE3& T_world_body_start) {
+PoseSolution PoseRefiner::solve(const SE3& T_world_body_start) {
   const StageSpan span(listener_, Stage::kPose);
   measurements_.clear();
   for (const Match& m : matcher_.matches()) {
@@ -36,7 +36,7 @@ PoseSolution PoseRefiner::solve(const Frame& frame, const SE3& T_world_body_star
     pm.inverse_depth_sigma = l.inverse_depth_sigma;
     pm.pixel = m.pixel.cast<double>();
     pm.sigma_px = m.sigma_px;
-    pm.camera = frame.camera;
+    pm.camera = m.camera;
     measurements_.push_back(pm);
   }
   PoseSolution s = solve_pose(matcher_.view()->rig, T_world_body_start, measurements_);
@@ -54,14 +54,14 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   matcher_.align(frame);
   out.matches = static_cast<int>(matcher_.matches().size());
   if (out.matches < config_.min_matches / 2) return out;
-  const PoseSolution s = solve(frame, T_world_body_start);
+  const PoseSolution s = solve(T_world_body_start);
   out.T_world_body = s.T_world_body;
   out.covariance = s.covariance;
   out.inliers = s.inliers;
   out.rms = s.rms;
   count_inliers(&out);
   out.ok = s.ok && s.inliers >= config_.min_inliers / 2;
-  if (out.ok) out.median_motion_px = motion_since_reference_px(frame, s.T_world_body);
+  if (out.ok) out.median_motion_px = motion_since_reference_px(s.T_world_body);
   return out;
 }
 
@@ -76,19 +76,24 @@ void PoseRefiner::count_inliers(TrackOutcome* outcome) const {
   }
 }
 
-// Median parallax: where landmarks are now against where rotation alone would have put them.
-double PoseRefiner::motion_since_reference_px(const Frame& frame, const SE3& T_world_body) {
-  const RigCamera& camera = matcher_.camera_of(frame);
+void PoseRefiner::add_motions_of(int index, const SE3& T_world_body) {
+  const RigCamera& camera = matcher_.camera(index);
   const Eigen::Vector3d centre = (T_world_body * camera.T_body_camera).t;
   const Eigen::Vector3d reference = (matcher_.view()->T_world_reference * camera.T_body_camera).t;
-  motions_px_.clear();
   for (const Match& m : matcher_.matches()) {
     const ViewLandmark& l = matcher_.landmark_of(m);
-    if (!m.inlier || !l.confirmed) continue;
+    if (m.camera != index || !m.inlier || !l.confirmed) continue;
     const Eigen::Vector4d& p = l.point_w;
     const Eigen::Vector3d now = p.head<3>() - p[3] * centre, then = p.head<3>() - p[3] * reference;
     motions_px_.push_back(std::atan2(now.cross(then).norm(), now.dot(then)) * camera.camera.focal_px());
   }
+}
+
+// Median parallax: where landmarks are now against where rotation alone would have put them.
+double PoseRefiner::motion_since_reference_px(const SE3& T_world_body) {
+  motions_px_.clear();
+  const auto cameras = static_cast<int>(matcher_.view()->rig.cameras.size());
+  for (int c = 0; c < cameras; ++c) add_motions_of(c, T_world_body);
   if (motions_px_.empty()) return 0.0;
   const auto middle = motions_px_.begin() + static_cast<std::ptrdiff_t>(motions_px_.size() / 2);
   std::nth_element(motions_px_.begin(), middle, motions_px_.end());

@@ -16,12 +16,12 @@ namespace farpoint::slam {
 // Tracking's thread; makes no heap call after construction.
 class PoseRefiner {
  public:
-  // `matcher` must outlive the refiner.
-  PoseRefiner(const EstimatorConfig& config, Matcher* matcher);
+  // `matcher` must outlive the refiner. `cameras`: of a frame.
+  PoseRefiner(const EstimatorConfig& config, Matcher* matcher, int cameras = 1);
   void listen(StageListener* listener) { listener_ = listener; }
 
   // Solves the pose from the present matches and marks which of them are inliers.
-  PoseSolution solve(const Frame& frame, const SE3& T_world_body_start);
+  PoseSolution solve(const SE3& T_world_body_start);
   // Keeps the inliers among the present matches, adds matches with the view's other landmarks around `start`,
   // aligns all, and solves.
   TrackOutcome refine(const Frame& frame, const SE3& T_world_body_start);
@@ -31,7 +31,8 @@ class PoseRefiner {
 
  private:
   void count_inliers(TrackOutcome* outcome) const;
-  [[nodiscard]] double motion_since_reference_px(const Frame& frame, const SE3& T_world_body);
+  [[nodiscard]] double motion_since_reference_px(const SE3& T_world_body);
+  void add_motions_of(int camera, const SE3& T_world_body);
 
   const TrackingConfig config_;
   Matcher& matcher_;

@@ -41,7 +41,6 @@ std::size_t Relocaliser::bytes() const {
 TrackOutcome Relocaliser::relocalise(const Frame& frame, const Motion& last) {
   const double gap_s =
       std::clamp(seconds_between(last.utime, frame.utime), 0.0, ConstantVelocity::kLongestGap_s);
-  const double radius_px = window_px(gap_s, matcher_.camera_of(frame).camera);
   const SE3 moved = last.extrapolated(gap_s), stood = last.T_world_body;
   struct Search {
     LandmarkSubset subset;
@@ -53,19 +52,21 @@ TrackOutcome Relocaliser::relocalise(const Frame& frame, const Motion& last) {
                              {LandmarkSubset::kRecent, nullptr},
                              {LandmarkSubset::kAll, &moved},
                              {LandmarkSubset::kAll, nullptr}};
-  for (const Search& s : searches) {
-    if (s.around != nullptr)
-      search_around(frame, *s.around, radius_px, s.subset);
-    else
-      search_image(frame, s.subset);
-    TrackOutcome out = pose_from_correspondences(frame);
-    if (out.ok) return out;
-  }
+  for (const Search& s : searches)
+    for (int c = 0; c < frame.views.size(); ++c) {
+      if (frame.views[c].set.features.empty()) continue;
+      if (s.around != nullptr)
+        search_around(frame, c, *s.around, window_px(gap_s, matcher_.camera(c).camera), s.subset);
+      else
+        search_image(frame, c, s.subset);
+      TrackOutcome out = pose_from_correspondences(frame, c);
+      if (out.ok) return out;
+    }
   return {};
 }
 
 // Searches each landmark around its projection from a pose.
-void Relocaliser::search_around(const Frame& frame, const SE3& T_world_body, double radius_px,
+void Relocaliser::search_around(const Frame& frame, int camera, const SE3& T_world_body, double radius_px,
                                 LandmarkSubset subset) {
   matcher_.project(frame, T_world_body, subset);
   const StageSpan span(listener_, Stage::kMatching);
@@ -75,18 +76,19 @@ void Relocaliser::search_around(const Frame& frame, const SE3& T_world_body, dou
   q.max_hamming = config_.max_hamming;
   q.ratio = kWindowRatio;
   for (const MatchCandidate& c : matcher_.candidates()) {
+    if (c.camera != camera) continue;
     q.u_px = static_cast<float>(c.prediction.pixel.x());
     q.v_px = static_cast<float>(c.prediction.pixel.y());
     q.min_level = c.level - kLevelsOpen;
     q.max_level = c.level + kLevelsOpen;
-    search_landmark(frame, c.view_index, q);
+    search_landmark(frame.views[camera], c.view_index, q);
   }
 }
 
 // Searches each landmark in the whole image.
-void Relocaliser::search_image(const Frame& frame, LandmarkSubset subset) {
+void Relocaliser::search_image(const Frame& frame, int index, LandmarkSubset subset) {
   const StageSpan span(listener_, Stage::kMatching);
-  const Camera& camera = matcher_.camera_of(frame).camera;
+  const Camera& camera = matcher_.camera(index).camera;
   correspondences_.clear();
   DescriptorQuery q;
   q.u_px = static_cast<float>(camera.width_px()) / 2;
@@ -97,26 +99,26 @@ void Relocaliser::search_image(const Frame& frame, LandmarkSubset subset) {
   q.max_level = levels_ - 1;
   const std::size_t landmarks = matcher_.view()->landmarks.size();
   for (std::size_t i = 0; i < landmarks; ++i)
-    if (matcher_.in_subset(i, subset)) search_landmark(frame, static_cast<std::uint32_t>(i), q);
+    if (matcher_.in_subset(i, subset)) search_landmark(frame.views[index], static_cast<std::uint32_t>(i), q);
 }
 
-void Relocaliser::search_landmark(const Frame& frame, std::uint32_t view_index,
+void Relocaliser::search_landmark(const FrameView& image, std::uint32_t view_index,
                                   const DescriptorQuery& query) {
   const ViewLandmark& landmark = matcher_.view()->landmarks[view_index];
   if (!landmark.confirmed || landmark.point_w[3] <= 0.0) return;
   DescriptorQuery q = query;
   q.descriptor = landmark.descriptor;
-  const int feature = find_descriptor(frame.set, frame.grid, q, [](std::size_t) { return true; });
+  const int feature = find_descriptor(image.set, image.grid, q, [](std::size_t) { return true; });
   if (feature >= 0) correspondences_.push_back({view_index, feature});
 }
 
-TrackOutcome Relocaliser::pose_from_correspondences(const Frame& frame) {
-  const RigCamera& camera = matcher_.camera_of(frame);
+TrackOutcome Relocaliser::pose_from_correspondences(const Frame& frame, int index) {
+  const RigCamera& camera = matcher_.camera(index);
   matcher_.begin(frame);
   bearings_.clear();
   points_.clear();
   std::erase_if(correspondences_, [&](const Correspondence& c) {
-    const Feature& f = frame.set.features[static_cast<std::size_t>(c.feature)];
+    const Feature& f = frame.views[index].set.features[static_cast<std::size_t>(c.feature)];
     Eigen::Vector3d bearing;
     if (!camera.camera.unproject({f.u_px, f.v_px}, &bearing)) return true;
     const Eigen::Vector4d& point = matcher_.view()->landmarks[c.view_index].point_w;
@@ -128,8 +130,9 @@ TrackOutcome Relocaliser::pose_from_correspondences(const Frame& frame) {
       solve_pnp(bearings_, points_, kCornerSigma_px / camera.camera.focal_px(), PnpOptions{}, &pnp_);
   if (!pnp.ok) return {};
   for (std::size_t i = 0; i < correspondences_.size(); ++i)
-    if (pnp.inlier[i] != 0) matcher_.add(frame, correspondences_[i].view_index, correspondences_[i].feature);
-  const PoseSolution s = refiner_.solve(frame, (camera.T_body_camera * pnp.T_camera_world).inverse());
+    if (pnp.inlier[i] != 0)
+      matcher_.add(frame, correspondences_[i].view_index, index, correspondences_[i].feature);
+  const PoseSolution s = refiner_.solve((camera.T_body_camera * pnp.T_camera_world).inverse());
   if (!s.ok) return {};
   TrackOutcome out = refiner_.refine(frame, s.T_world_body);
   out.ok = out.ok && out.inliers >= config_.min_inliers && out.agreed();

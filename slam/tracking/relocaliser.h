@@ -24,9 +24,9 @@ class Relocaliser {
   Relocaliser(const EstimatorConfig& config, Matcher* matcher, PoseRefiner* refiner);
   void listen(StageListener* listener) { listener_ = listener; }
 
-  // Searches the landmarks seen last, then the whole view: around where the motion would have led, where the
-  // vehicle was last, and anywhere in the image. `last`: the last confirmed motion. Needs a view. Not ok
-  // where too few landmarks are found, or those found contradict each other.
+  // Searches the landmarks seen last, then the whole view, in each camera's image by itself: around where the
+  // motion would have led, where the vehicle was last, and anywhere in the image. `last`: the last confirmed
+  // motion. Needs a view. Not ok where too few landmarks are found, or those found contradict each other.
   TrackOutcome relocalise(const Frame& frame, const Motion& last);
 
   // Bytes of the work space.
@@ -39,10 +39,12 @@ class Relocaliser {
     std::int32_t feature = -1;
   };
 
-  void search_around(const Frame& frame, const SE3& T_world_body, double radius_px, LandmarkSubset subset);
-  void search_image(const Frame& frame, LandmarkSubset subset);
-  void search_landmark(const Frame& frame, std::uint32_t view_index, const DescriptorQuery& query);
-  TrackOutcome pose_from_correspondences(const Frame& frame);
+  // All in the image of one camera.
+  void search_around(const Frame& frame, int camera, const SE3& T_world_body, double radius_px,
+                     LandmarkSubset subset);
+  void search_image(const Frame& frame, int camera, LandmarkSubset subset);
+  void search_landmark(const FrameView& image, std::uint32_t view_index, const DescriptorQuery& query);
+  TrackOutcome pose_from_correspondences(const Frame& frame, int camera);
 
   const TrackingConfig config_;
   const int levels_;  // of the pyramid

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "slam/map/frame.h"
+#include "slam/map/request.h"
 
 namespace farpoint::slam {
 

@@ -13,13 +13,13 @@ constexpr float kPriorRatio = 0.9F;
 
 }  // namespace
 
-Tracker::Tracker(const EstimatorConfig& config)
+Tracker::Tracker(const EstimatorConfig& config, int cameras)
     : config_(config.tracking),
-      matcher_(config),
-      refiner_(config, &matcher_),
+      matcher_(config, cameras),
+      refiner_(config, &matcher_, cameras),
       relocaliser_(config, &matcher_, &refiner_),
       counter_(static_cast<std::size_t>(config.capacity.landmarks)) {
-  const auto features = static_cast<std::size_t>(config.extractor.features);
+  const auto features = static_cast<std::size_t>(cameras * config.extractor.features);
   reserve_touched(&last_seen_, features);
   reserve_touched(&confirmed_seen_, features);
 }
@@ -85,7 +85,7 @@ bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
     projected = a.subset;
     matcher_.begin(frame);
     if (matcher_.match(frame, a.radius_px, kPriorRatio) < config_.min_matches) continue;
-    const PoseSolution s = refiner_.solve(frame, *T_world_body);
+    const PoseSolution s = refiner_.solve(*T_world_body);
     if (!explains_matches(s)) continue;
     *T_world_body = s.T_world_body;
     return true;
@@ -134,7 +134,7 @@ void Tracker::note_seen() {
 void Tracker::sightings(std::vector<Sighting>* out) const {
   out->clear();
   for (const Match& m : matcher_.matches())
-    if (m.inlier) out->push_back({matcher_.landmark_of(m).handle, m.feature, m.pixel, m.sigma_px});
+    if (m.inlier) out->push_back({matcher_.landmark_of(m).handle, m.feature, m.pixel, m.sigma_px, m.camera});
 }
 
 }  // namespace farpoint::slam

@@ -11,6 +11,7 @@
 #include "slam/geometry/motion_model.h"
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
+#include "slam/map/request.h"
 #include "slam/stages.h"
 #include "slam/tracking/constant_velocity.h"
 #include "slam/tracking/matcher.h"
@@ -24,7 +25,8 @@ namespace farpoint::slam {
 // One thread. Makes no heap call after construction while views and frames keep to the configured capacities.
 class Tracker {
  public:
-  explicit Tracker(const EstimatorConfig& config);
+  // `cameras`: of a frame; work space is allocated for as many.
+  explicit Tracker(const EstimatorConfig& config, int cameras = 1);
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 

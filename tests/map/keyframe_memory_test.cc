@@ -14,7 +14,7 @@ constexpr std::size_t kFeatures = 30;
 TEST(KeyframeMemory, GivesWhatItPreallocatedAndThenNothing) {
   KeyframeMemory memory({.features = kFeatures, .with_pixels = 2, .thinned = 0});
   for (int i = 0; i < 2; ++i) {
-    const Keyframe k = memory.take();
+    const KeyframeView k = memory.take();
     EXPECT_GE(k.set.features.capacity(), kFeatures);
     EXPECT_GE(k.set.descriptors.capacity(), kFeatures);
     EXPECT_GE(k.landmarks.capacity(), kFeatures);
@@ -25,7 +25,7 @@ TEST(KeyframeMemory, GivesWhatItPreallocatedAndThenNothing) {
 
 TEST(KeyframeMemory, WhatIsGivenBackIsGivenAgain) {
   KeyframeMemory memory({.features = kFeatures, .with_pixels = 1, .thinned = 0});
-  Keyframe k = memory.take();
+  KeyframeView k = memory.take();
   k.set.features.emplace_back();
   const Feature* features = k.set.features.data();
   const LandmarkHandle* landmarks = k.landmarks.data();
@@ -34,7 +34,7 @@ TEST(KeyframeMemory, WhatIsGivenBackIsGivenAgain) {
   memory.give_back(&k);
   EXPECT_EQ(memory.bytes(), bytes);
   EXPECT_EQ(KeyframeMemory::array_bytes(k), 0U) << "the keyframe has none of it any more";
-  const Keyframe again = memory.take();
+  const KeyframeView again = memory.take();
   EXPECT_EQ(again.set.features.data(), features);
   EXPECT_EQ(again.landmarks.data(), landmarks);
 }
@@ -84,15 +84,17 @@ class MapMemory : public testing::Test {
   // Filled into preallocated arrays, as mapping does; makes `landmarks` with the one before, which
   // all that have pixels see.
   KeyframeHandle next_keyframe(Map* map, KeyframeHandle before, int landmarks) {
-    const Keyframe made = make_keyframe(map->rig(), 0, random_pose(&random), kMostFeatures, &random);
-    Keyframe k = map->preallocated_keyframe();
-    k.image = made.image;
-    k.set = made.set;
-    k.bearings = made.bearings;
+    const KeyframeView made = make_view(map->camera(0).camera, kMostFeatures, &random);
+    Keyframe k = map->new_keyframe();
+    k.T_world_body = random_pose(&random);
+    k.views[0] = map->preallocated_view();
+    k.views[0].image = made.image;
+    k.views[0].set = made.set;
+    k.views[0].bearings = made.bearings;
     const KeyframeHandle handle = map->add_keyframe(std::move(k));
     for (int i = 0; !before.is_null() && i < landmarks; ++i) {
       const auto feature = static_cast<std::size_t>(i);
-      const LandmarkHandle l = map->add_landmark(handle, feature);
+      const LandmarkHandle l = map->add_landmark(handle, 0, feature);
       for (const KeyframeHandle older : alive_)
         (void)map->add_observation(l, sighting(*map, older, kMostFeatures - 1 - feature));
     }

@@ -59,14 +59,10 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// A keyframe with `features` corners anywhere in the image.
-inline Keyframe make_keyframe(const Rig& rig, int camera, const SE3& T_world_body, int features,
-                              Random* random) {
-  Keyframe k;
-  k.camera = camera;
-  k.T_world_body = T_world_body;
-  k.image = std::make_shared<FakeImage>();
-  const Camera& model = rig.cameras[static_cast<std::size_t>(camera)].camera;
+// `features` corners anywhere in the image.
+inline KeyframeView make_view(const Camera& model, int features, Random* random) {
+  KeyframeView view;
+  view.image = std::make_shared<FakeImage>();
   for (int i = 0; i < features; ++i) {
     Feature f;
     f.u_px = static_cast<float>(random->uniform(5, 630));
@@ -79,11 +75,28 @@ inline Keyframe make_keyframe(const Rig& rig, int camera, const SE3& T_world_bod
       --i;
       continue;
     }
-    k.set.features.push_back(f);
-    k.set.descriptors.push_back(d);
-    k.bearings.emplace_back(bearing.cast<float>());
+    view.set.features.push_back(f);
+    view.set.descriptors.push_back(d);
+    view.bearings.emplace_back(bearing.cast<float>());
   }
+  return view;
+}
+
+// A keyframe to which one camera gave an image.
+inline Keyframe make_keyframe(const Rig& rig, int camera, const SE3& T_world_body, int features,
+                              Random* random) {
+  Keyframe k;
+  k.T_world_body = T_world_body;
+  k.views = PerCamera<KeyframeView>(static_cast<int>(rig.cameras.size()));
+  k.views[camera] = make_view(rig.cameras[static_cast<std::size_t>(camera)].camera, features, random);
   return k;
+}
+
+// The first camera that gave it an image.
+inline int camera_of(const Keyframe& keyframe) {
+  int camera = 0;
+  while (camera + 1 < keyframe.views.size() && keyframe.views[camera].landmarks.empty()) ++camera;
+  return camera;
 }
 
 inline SE3 random_pose(Random* random) {
@@ -91,10 +104,17 @@ inline SE3 random_pose(Random* random) {
 }
 
 // The sighting of a feature where it is, with an error of 1 px; of a thinned keyframe's, somewhere.
-inline Observation sighting(const Map& map, KeyframeHandle keyframe, std::size_t feature) {
-  const std::vector<Feature>& features = map.keyframes()[keyframe].set.features;
+inline Observation sighting(const Map& map, KeyframeHandle keyframe, std::size_t feature, int camera) {
+  const std::vector<Feature>& features = map.keyframes()[keyframe].views[camera].set.features;
   const Feature f = feature < features.size() ? features[feature] : Feature{};
-  return {keyframe, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 1.0F};
+  return {keyframe, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 1.0F,
+          0,        static_cast<std::uint8_t>(camera)};
+}
+inline Observation sighting(const Map& map, KeyframeHandle keyframe, std::size_t feature) {
+  return sighting(map, keyframe, feature, camera_of(map.keyframes()[keyframe]));
+}
+inline LandmarkHandle add_landmark(Map* map, KeyframeHandle keyframe, std::size_t feature) {
+  return map->add_landmark(keyframe, camera_of(map->keyframes()[keyframe]), feature);
 }
 
 template <typename T>

@@ -20,17 +20,19 @@ void expect_same_pose(const SE3& a, const SE3& b) {
 
 namespace {
 
-void check_keyframe_links(const Map& map, KeyframeHandle h, const Keyframe& k) {
-  const bool thinned = k.image == nullptr;
-  ASSERT_TRUE(thinned || k.landmarks.size() == k.set.features.size());
-  for (std::size_t f = 0; f < k.landmarks.size(); ++f) {
-    if (k.landmarks[f].is_null()) continue;
-    const Landmark* l = map.landmarks().get(k.landmarks[f]);
+void check_view_links(const Map& map, KeyframeHandle h, int camera) {
+  const Keyframe& k = map.keyframes()[h];
+  const KeyframeView& view = k.views[camera];
+  const bool thinned = view.image == nullptr;
+  ASSERT_TRUE(thinned || view.landmarks.size() == view.set.features.size());
+  for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
+    if (view.landmarks[f].is_null()) continue;
+    const Landmark* l = map.landmarks().get(view.landmarks[f]);
     ASSERT_NE(l, nullptr) << "keyframe " << k.id << " feature " << f << " names a landmark that is gone";
-    const Observation* o = Map::find_observation(*l, h);
-    ASSERT_NE(o, nullptr) << "keyframe " << k.id << " feature " << f << ": landmark does not know it";
+    const Observation* o = Map::find_observation(*l, h, camera);
+    ASSERT_NE(o, nullptr) << "keyframe " << k.id << " feature " << f << ": landmark does not name it";
     ASSERT_EQ(o->feature, static_cast<int>(f));
-    ASSERT_TRUE(thinned || o->level == k.set.features[f].level);
+    ASSERT_TRUE(thinned || o->level == view.set.features[f].level);
   }
 }
 
@@ -38,22 +40,23 @@ void check_landmark_links(const Map& map, const CapacityConfig& capacity, Landma
                           const Landmark& l) {
   ASSERT_GE(l.observations.size(), 1U);
   ASSERT_LE(l.observations.size(), static_cast<std::size_t>(capacity.observations_per_landmark));
-  std::uint64_t last_id = 0;
+  std::pair<std::uint64_t, int> last{0, 0};
   double largest = 0;
   for (const Observation& o : l.observations) {
     const Keyframe* k = map.keyframes().get(o.keyframe);
     ASSERT_NE(k, nullptr) << "landmark " << l.id << " is seen by a keyframe that is gone";
-    ASSERT_GT(k->id, last_id) << "landmark " << l.id << ": observations out of order";
-    last_id = k->id;
-    ASSERT_EQ(k->landmarks.at(static_cast<std::size_t>(o.feature)), h);
+    const std::pair<std::uint64_t, int> place{k->id, o.camera};
+    ASSERT_GT(place, last) << "landmark " << l.id << ": observations out of order";
+    last = place;
+    ASSERT_EQ(k->views[o.camera].landmarks.at(static_cast<std::size_t>(o.feature)), h);
     largest = std::max(largest, map.parallax(l, o));
   }
   ASSERT_NE(Map::find_observation(l, l.host), nullptr) << "landmark " << l.id << " is hosted by no observer";
-  ASSERT_GE(l.last_seen_keyframe, last_id);
+  ASSERT_GE(l.last_seen_keyframe, last.first);
   // Poses stand still here, so the kept parallax is today's.
   ASSERT_NEAR(l.max_parallax_rad, largest, 1e-6);
   if (!l.parallax_keyframe.is_null()) {
-    const Observation* best = Map::find_observation(l, l.parallax_keyframe);
+    const Observation* best = Map::find_observation(l, l.parallax_keyframe, l.parallax_camera);
     ASSERT_NE(best, nullptr) << "landmark " << l.id << ": its best pair is gone";
     ASSERT_NEAR(map.parallax(l, *best), largest, 1e-6);
   }
@@ -101,7 +104,7 @@ void check_chain(const Map& map, KeyframeHandle h, const Keyframe& k) {
 
 void check(const Map& map, const CapacityConfig& capacity) {
   map.keyframes().for_each([&](KeyframeHandle h, const Keyframe& k) {
-    check_keyframe_links(map, h, k);
+    for (int c = 0; c < k.views.size(); ++c) check_view_links(map, h, c);
     check_covisibility(map, h, k);
     check_chain(map, h, k);
   });
@@ -116,9 +119,10 @@ void Shaker::step() {
   if (keyframes.size() < 2 || what < 6) return add_keyframe();
   const KeyframeHandle k = keyframes[random_.below(keyframes.size())];
   if (what < 10) return remove_keyframe(k);
-  if (landmarks.empty() || what < 35) return add_landmark(k);
+  const Observer by{k, static_cast<int>(random_.below(2))};
+  if (landmarks.empty() || what < 35) return add_landmark(by);
   const LandmarkHandle l = landmarks[random_.below(landmarks.size())];
-  if (what < 75) return add_observation(l, k);
+  if (what < 75) return add_observation(l, by);
   if (what < 85) return remove_observation(l);
   if (what < 88) return map_.remove_landmark(l);
   if (what < 95) return map_.rehost(l, k);
@@ -131,6 +135,8 @@ void Shaker::add_keyframe() {
   Keyframe keyframe = make_keyframe(map_.rig(), static_cast<int>(random_.below(2)), random_pose(&random_),
                                     kFeatures, &random_);
   keyframe.utime = utime_ += 1000;
+  if (random_.below(2) == 0)
+    for (const int c : {0, 1}) keyframe.views[c] = make_view(map_.camera(c).camera, kFeatures, &random_);
   const auto h = map_.add_keyframe(std::move(keyframe));
   EXPECT_EQ(h.is_null(), was_full);
   full += h.is_null() ? 1 : 0;
@@ -142,13 +148,13 @@ void Shaker::remove_keyframe(KeyframeHandle k) {
   ++gone;
 }
 
-void Shaker::add_landmark(KeyframeHandle k) {
-  const Keyframe& keyframe = map_.keyframes()[k];
-  if (keyframe.landmarks.empty()) return;
-  const std::size_t feature = random_.below(keyframe.landmarks.size());
-  const bool impossible = !keyframe.landmarks[feature].is_null() || !keyframe.image;
+void Shaker::add_landmark(Observer by) {
+  const KeyframeView& view = map_.keyframes()[by.keyframe].views[by.camera];
+  if (view.landmarks.empty()) return;
+  const std::size_t feature = random_.below(view.landmarks.size());
+  const bool impossible = !view.landmarks[feature].is_null() || !view.has_pixels();
   const bool was_full = map_.landmarks().full();
-  const LandmarkHandle h = map_.add_landmark(k, feature);
+  const LandmarkHandle h = map_.add_landmark(by.keyframe, by.camera, feature);
   EXPECT_EQ(h.is_null(), impossible || was_full);
   if (h.is_null()) return;
   handles.push_back(h);
@@ -157,12 +163,13 @@ void Shaker::add_landmark(KeyframeHandle k) {
   l.inverse_depth = random_.uniform(0.0, 0.2);
 }
 
-void Shaker::add_observation(LandmarkHandle l, KeyframeHandle k) {
-  if (map_.keyframes()[k].landmarks.empty()) return;
-  const std::size_t feature = random_.below(map_.keyframes()[k].landmarks.size());
-  const bool taken = !map_.keyframes()[k].landmarks[feature].is_null();
-  const bool seen = Map::find_observation(map_.landmarks()[l], k) != nullptr;
-  const bool ok = map_.add_observation(l, sighting(map_, k, feature));
+void Shaker::add_observation(LandmarkHandle l, Observer by) {
+  const std::vector<LandmarkHandle>& there = map_.keyframes()[by.keyframe].views[by.camera].landmarks;
+  if (there.empty()) return;
+  const std::size_t feature = random_.below(there.size());
+  const bool taken = !there[feature].is_null();
+  const bool seen = Map::find_observation(map_.landmarks()[l], by.keyframe, by.camera) != nullptr;
+  const bool ok = map_.add_observation(l, sighting(map_, by.keyframe, feature, by.camera));
   EXPECT_EQ(ok, !taken && !seen);
   ++(ok ? added : refused);
 }
@@ -170,7 +177,8 @@ void Shaker::add_observation(LandmarkHandle l, KeyframeHandle k) {
 void Shaker::remove_observation(LandmarkHandle h) {
   const Landmark& l = map_.landmarks()[h];
   const std::size_t before = l.observations.size();
-  const bool lives = map_.remove_observation(h, l.observations[random_.below(before)].keyframe);
+  const Observation& o = l.observations[random_.below(before)];
+  const bool lives = map_.remove_observation(h, o.keyframe, o.camera);
   EXPECT_EQ(lives, before > 2);
   EXPECT_EQ(map_.landmarks().contains(h), lives);
 }

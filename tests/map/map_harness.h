@@ -20,7 +20,7 @@ void check(const Map& map, const CapacityConfig& capacity);
 
 void expect_same_pose(const SE3& a, const SE3& b);
 
-// Random use of every operation that changes links.
+// Random use of every operation that changes links. Either camera gives an image, or both.
 class Shaker {
  public:
   Shaker(Map* map, std::uint64_t seed) : map_(*map), random_(seed) {}
@@ -33,8 +33,8 @@ class Shaker {
  private:
   void add_keyframe();
   void remove_keyframe(KeyframeHandle k);
-  void add_landmark(KeyframeHandle k);
-  void add_observation(LandmarkHandle l, KeyframeHandle k);
+  void add_landmark(Observer by);
+  void add_observation(LandmarkHandle l, Observer by);
   void remove_observation(LandmarkHandle h);
 
   Map& map_;
@@ -50,7 +50,7 @@ class MapTest : public testing::Test {
   // Seen by all of `keyframes` at the feature of that number; the first is the host.
   LandmarkHandle landmark(const std::vector<KeyframeHandle>& keyframes, std::size_t feature,
                           double rho = 0.1) {
-    const LandmarkHandle h = map.add_landmark(keyframes[0], feature);
+    const LandmarkHandle h = add_landmark(&map, keyframes[0], feature);
     EXPECT_FALSE(h.is_null());
     map.landmarks()[h].state = LandmarkState::kFull;
     map.landmarks()[h].inverse_depth = rho;
@@ -68,6 +68,11 @@ class MapTest : public testing::Test {
     for (const Observation& o : map.landmarks()[h].observations)
       ids.push_back(map.keyframes()[o.keyframe].id);
     return ids;
+  }
+
+  KeyframeView& view(KeyframeHandle h) { return map.keyframes()[h].views[camera_of(map.keyframes()[h])]; }
+  bool remove_observation(LandmarkHandle h, KeyframeHandle k) {
+    return map.remove_observation(h, k, camera_of(map.keyframes()[k]));
   }
 
   Rig rig = two_camera_rig();

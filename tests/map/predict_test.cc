@@ -146,7 +146,7 @@ TEST_F(PredictTest, TheMapsOwnDerivativeGivesThePrediction) {
   const KeyframeHandle k = map.add_keyframe(make_keyframe(rig, 0, random_pose(&random), 100, &random));
   int seen = 0;
   for (std::size_t f = 0; f < 100; ++f) {
-    const LandmarkHandle h = map.add_landmark(k, f);
+    const LandmarkHandle h = map.add_landmark(k, 0, f);
     Landmark& l = map.landmarks()[h];
     l.inverse_depth = 0.1;
     const SE3 T_world_anchor = map.T_world_anchor(l);
@@ -156,10 +156,10 @@ TEST_F(PredictTest, TheMapsOwnDerivativeGivesThePrediction) {
     in.d_point_d_pixel = T_world_anchor.rotation() * l.d_bearing_d_pixel;
     Prediction p;
     // Seen from its own camera every corner is where and as it was.
-    if (!predict(in, rig.cameras[0].camera, map.T_world_camera(map.keyframes()[k]).inverse(), 0.0, &p))
+    if (!predict(in, rig.cameras[0].camera, map.T_world_camera(map.keyframes()[k], 0).inverse(), 0.0, &p))
       continue;
     ++seen;
-    const Feature& feature = map.keyframes()[k].set.features[f];
+    const Feature& feature = map.keyframes()[k].views[0].set.features[f];
     EXPECT_LT((p.pixel - Eigen::Vector2d(feature.u_px, feature.v_px)).norm(), 1e-3);
     EXPECT_LT((p.A_target_host - Eigen::Matrix2f::Identity()).norm(), 1e-3F);
     EXPECT_LT(p.d_pixel_d_inverse_depth.norm(), 1e-6);

@@ -15,7 +15,7 @@ using test::PointWorld;
 class BackEndTest : public ::testing::Test {
  protected:
   MappingJob* begin(MappingJobKind kind, std::int32_t map_id = 1) {
-    MappingJob* job = exchange.jobs.begin_push();
+    MappingJob* job = rings.jobs.begin_push();
     job->kind = kind;
     job->number = ++jobs;
     job->frame_number = 10 + jobs;
@@ -25,15 +25,15 @@ class BackEndTest : public ::testing::Test {
   }
   void send_start(std::int32_t map_id = 1) {
     begin(MappingJobKind::kStartMap, map_id)->pair = world.initial_pair(world.frame(0), world.frame(1));
-    exchange.jobs.end_push();
+    rings.jobs.end_push();
   }
   void send_keyframe(int step, const LocalView& view) {
     begin(MappingJobKind::kKeyframe)->keyframe = world.keyframe_request(step, view);
-    exchange.jobs.end_push();
+    rings.jobs.end_push();
   }
   void send(MappingJobKind kind, std::int32_t map_id) {
     begin(kind, map_id);
-    exchange.jobs.end_push();
+    rings.jobs.end_push();
   }
   // One step, whose reply is handed over and taken.
   MappingReply step() {
@@ -42,9 +42,9 @@ class BackEndTest : public ::testing::Test {
       return {};
     }
     side.hand_over();
-    MappingReply reply = *exchange.replies.front();
-    exchange.replies.front()->view.reset();
-    exchange.replies.pop();
+    MappingReply reply = *rings.replies.front();
+    rings.replies.front()->view.reset();
+    rings.replies.pop();
     return reply;
   }
   std::shared_ptr<const LocalView> started(std::int32_t map_id = 1) {
@@ -52,28 +52,28 @@ class BackEndTest : public ::testing::Test {
     return step().view;
   }
   void record(std::int64_t utime, std::int32_t map_id, std::uint64_t reference_id) {
-    EXPECT_TRUE(exchange.recorded.push({utime, map_id, reference_id, SE3{}}));
+    EXPECT_TRUE(rings.recorded.push({utime, map_id, reference_id, SE3{}}));
   }
 
   PointWorld world;
   const EstimatorConfig config = test::small_config();
-  Exchange exchange{config};
-  MappingSide side{config, world.rig(), &exchange};
+  MappingRings rings{config};
+  BackEnd side{config, world.rig(), &rings};
   std::uint64_t jobs = 0;
 };
 
 TEST_F(BackEndTest, DoesNothingWithoutAJob) {
   EXPECT_FALSE(side.step());
-  EXPECT_EQ(exchange.replies.front(), nullptr);
+  EXPECT_EQ(rings.replies.front(), nullptr);
 }
 
 TEST_F(BackEndTest, StartOfAMapIsOneReplyWithItsView) {
   send_start(3);
   ASSERT_TRUE(side.step());
-  EXPECT_EQ(exchange.replies.front(), nullptr) << "handed over too early";
+  EXPECT_EQ(rings.replies.front(), nullptr) << "handed over too early";
   EXPECT_EQ(side.reply().stage, MappingStage::kStarted);
   side.hand_over();
-  const MappingReply* reply = exchange.replies.front();
+  const MappingReply* reply = rings.replies.front();
   ASSERT_NE(reply, nullptr);
   EXPECT_EQ(reply->number, 1U);
   EXPECT_EQ(reply->job_number, 1U);
@@ -85,14 +85,14 @@ TEST_F(BackEndTest, StartOfAMapIsOneReplyWithItsView) {
   EXPECT_EQ(reply->keyframes, 2U);
   EXPECT_EQ(reply->landmarks, side.mapper().map().landmarks().size());
   EXPECT_EQ(reply->counts.keyframes_made, 2U);
-  EXPECT_EQ(exchange.jobs.front(), nullptr);
+  EXPECT_EQ(rings.jobs.front(), nullptr);
 }
 
 TEST_F(BackEndTest, MapThatDoesNotHoldIsAReplyWithoutAView) {
   MappingJob* job = begin(MappingJobKind::kStartMap);
   job->pair = world.initial_pair(world.frame(0), world.frame(1));
   job->pair.points.resize(10);
-  exchange.jobs.end_push();
+  rings.jobs.end_push();
   const MappingReply reply = step();
   EXPECT_EQ(reply.stage, MappingStage::kStarted);
   EXPECT_FALSE(reply.view);
@@ -107,11 +107,11 @@ TEST_F(BackEndTest, KeyframeIsAQuickReplyThenAFullOne) {
   const MappingReply quick = step();
   EXPECT_EQ(quick.stage, MappingStage::kQuick);
   EXPECT_FALSE(quick.ends_job);
-  EXPECT_NE(exchange.jobs.front(), nullptr) << "the job ended with its first reply";
+  EXPECT_NE(rings.jobs.front(), nullptr) << "the job ended with its first reply";
   const MappingReply full = step();
   EXPECT_EQ(full.stage, MappingStage::kFull);
   EXPECT_TRUE(full.ends_job);
-  EXPECT_EQ(exchange.jobs.front(), nullptr);
+  EXPECT_EQ(rings.jobs.front(), nullptr);
   EXPECT_EQ(quick.number, 2U);
   EXPECT_EQ(full.number, 3U);
   EXPECT_EQ(quick.job_number, 2U);
@@ -134,7 +134,7 @@ TEST_F(BackEndTest, UnusableKeyframeIsOneReplyWithoutAView) {
   EXPECT_EQ(reply.stage, MappingStage::kDone);
   EXPECT_TRUE(reply.ends_job);
   EXPECT_FALSE(reply.view);
-  EXPECT_EQ(exchange.jobs.front(), nullptr);
+  EXPECT_EQ(rings.jobs.front(), nullptr);
   send_keyframe(2, *view);
   EXPECT_EQ(step().stage, MappingStage::kQuick);
 }
@@ -146,7 +146,7 @@ TEST_F(BackEndTest, EndedJobHoldsNoFramesAndViews) {
   job->keyframe.frame = job->pair.first = job->pair.second = frame;
   job->frames.push_back(frame);
   job->view = view;
-  exchange.jobs.end_push();
+  rings.jobs.end_push();
   step();
   EXPECT_EQ(frame.use_count(), 1);
   EXPECT_EQ(view.use_count(), 2);  // this one and the pool's
@@ -170,17 +170,17 @@ TEST_F(BackEndTest, RetiredMapStaysWithoutPixels) {
   send(MappingJobKind::kRetireMap, 1);
   EXPECT_EQ(step().keyframes, 2U);
   side.mapper().map().keyframes().for_each(
-      [](KeyframeHandle, const Keyframe& k) { EXPECT_EQ(k.image, nullptr); });
+      [](KeyframeHandle, const Keyframe& k) { EXPECT_FALSE(k.has_pixels()); });
 }
 
 TEST_F(BackEndTest, RecordsNothingWithoutTheWholeTrajectory) {
   EstimatorConfig endless = config;
   endless.capacity.whole_trajectory = false;
-  MappingSide other(endless, world.rig(), &exchange);
+  BackEnd other(endless, world.rig(), &rings);
   record(1, 1, 1);
   other.collect_recorded();
   EXPECT_TRUE(other.recorded().empty());
-  EXPECT_EQ(exchange.recorded.front(), nullptr);
+  EXPECT_EQ(rings.recorded.front(), nullptr);
 }
 
 // Frames from before and after the pair are posed against the map's view, and recorded.
@@ -195,7 +195,7 @@ TEST_F(BackEndTest, PosesFramesFromBeforeTheMap) {
   const SE3 earlier = before * SE3{Eigen::Quaterniond::Identity(), {-0.05, -0.03, 0.01}};
   job->frames = {world.frame(earlier, 2), world.frame(before, 3), world.frame(after, 5)};
   job->view = view;
-  exchange.jobs.end_push();
+  rings.jobs.end_push();
   EXPECT_EQ(step().stage, MappingStage::kDone);
   ASSERT_EQ(side.recorded().size(), 5U);
   const auto pose_of = [&](std::size_t i) {
@@ -217,7 +217,7 @@ TEST_F(BackEndTest, PosesNoFramesOfAMapThatHasGone) {
   MappingJob* job = begin(MappingJobKind::kPoseFrames);
   job->frames = {world.frame(0)};
   job->view = view;
-  exchange.jobs.end_push();
+  rings.jobs.end_push();
   step();
   EXPECT_TRUE(side.recorded().empty());
 }

@@ -10,30 +10,35 @@ namespace {
 // A scene whose map believes in a camera that is wrong by `truth`, refined as mapping does it.
 class CalibratedScene {
  public:
-  CalibratedScene(const CalibrationDelta& truth, std::uint64_t seed)
+  // Camera `index` of the rig is wrong; any others are right.
+  CalibratedScene(const CalibrationDelta& truth, std::uint64_t seed, int cameras = 1, int index = 0)
       : scene_({.points = 800,
+                .cameras = cameras,
                 .rehosted_share = 0.0,
                 .noise_px = 0.2,
                 .start_m = 0.01,
                 .start_rad = 0.001,
                 .start_log_depth = 0.02,
                 .seed = seed}),
-        given_(refined_camera(scene_.rig.cameras[0].camera, -truth)),
-        calibrator_({}, given_) {
+        index_(static_cast<std::size_t>(index)),
+        given_(refined_camera(scene_.rig.cameras[index_].camera, -truth)),
+        calibrator_({}, given_, index) {
     // Where the true camera saw what each landmark's host saw.
     for (const auto& point : scene_.truth.points) {
       Eigen::Vector2d pixel;
-      EXPECT_TRUE(scene_.rig.cameras[0].camera.project(point.bearing, &pixel));
+      EXPECT_TRUE(scene_.rig.cameras[host_camera(point)].camera.project(point.bearing, &pixel));
       host_pixels_.push_back(pixel);
     }
   }
 
   // One keyframe's turn: local BA with the camera believed in, then the refinement. True where it moved.
   bool turn() {
-    scene_.rig.cameras[0].camera = calibrator_.camera();
-    const Camera& camera = scene_.rig.cameras[0].camera;
-    std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(host_pixels_.size());
+    scene_.rig.cameras[index_].camera = calibrator_.camera();
+    const Camera& camera = scene_.rig.cameras[index_].camera;
+    std::vector<Eigen::Matrix<double, 3, 2>> d_bearing(host_pixels_.size(),
+                                                       Eigen::Matrix<double, 3, 2>::Zero());
     for (std::size_t i = 0; i < host_pixels_.size(); ++i) {
+      if (host_camera(scene_.start.points[i]) != index_) continue;
       EXPECT_TRUE(camera.unproject(host_pixels_[i], &scene_.start.points[i].bearing));
       for (int axis = 0; axis < 2; ++axis) {
         const Eigen::Vector2d half = 0.5 * Eigen::Vector2d::Unit(axis);
@@ -50,7 +55,14 @@ class CalibratedScene {
   [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
 
  private:
+  [[nodiscard]] std::size_t host_camera(const BundleProblem::Point& point) const {
+    std::size_t camera = 0;
+    while (scene_.rig.cameras[camera].T_body_camera.t != point.T_host_anchor.t) ++camera;
+    return camera;
+  }
+
   BundleScene scene_;
+  std::size_t index_;
   Camera given_;
   Calibrator calibrator_;
   std::vector<Eigen::Vector2d> host_pixels_;
@@ -67,6 +79,27 @@ TEST(Calibrator, FindsWhatIsWrongWithTheCamera) {
     EXPECT_LT(std::abs(error[i]), 0.4 * std::abs(truth[i])) << i << ": " << scene.calibrator().delta()[i];
   }
   EXPECT_FALSE(scene.calibrator().contradicts_given()) << scene.calibrator().surprise();
+}
+
+TEST(Calibrator, FindsWhatIsWrongWithEitherCameraOfTwo) {
+  const CalibrationDelta truth(0.004, 1.5, -1.0, 0.01);
+  for (const int camera : {0, 1}) {
+    CalibratedScene scene(truth, 3, 2, camera);
+    for (int i = 0; i < 8; ++i) scene.turn();
+    const CalibrationDelta error = scene.calibrator().delta() - truth, sigma = scene.calibrator().sigma();
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_LT(std::abs(error[i]), 4.0 * sigma[i]) << camera << ' ' << i;
+      EXPECT_LT(std::abs(error[i]), 0.5 * std::abs(truth[i])) << camera << ' ' << i;
+    }
+  }
+}
+
+TEST(Calibrator, ARightCameraBesideARightOneIsLeftAlone) {
+  CalibratedScene scene(CalibrationDelta::Zero(), 4, 2, 1);
+  for (int i = 0; i < 4; ++i) scene.turn();
+  const CalibrationDelta sigma = scene.calibrator().sigma();
+  for (int i = 0; i < 4; ++i) EXPECT_LT(std::abs(scene.calibrator().delta()[i]), 4.0 * sigma[i]) << i;
+  EXPECT_LT(scene.calibrator().surprise(), 3.0);
 }
 
 TEST(Calibrator, LeavesARightCameraAlone) {

@@ -46,7 +46,7 @@ class MapperTest : public ::testing::Test {
     const Map& map = mapper.map();
     const KeyframeHandle handle = by_id(id);
     std::map<std::uint32_t, int> shared;
-    for (const LandmarkHandle& h : map.keyframes()[handle].landmarks) {
+    for (const LandmarkHandle& h : map.keyframes()[handle].views[0].landmarks) {
       const Landmark* l = map.landmarks().get(h);
       if (l == nullptr || l->state == LandmarkState::kBearing) continue;
       for (const Observation& o : l->observations)
@@ -214,8 +214,8 @@ TEST_F(MapperTest, RetiredMapKeepsItsKeyframesWithoutPixels) {
   mapper.retire_map(1);
   int with_pixels = 0;
   mapper.map().keyframes().for_each([&](KeyframeHandle, const Keyframe& k) {
-    EXPECT_EQ(k.image != nullptr, k.map_id == 2);
-    with_pixels += k.image != nullptr ? 1 : 0;
+    EXPECT_EQ(k.has_pixels(), k.map_id == 2);
+    with_pixels += k.has_pixels() ? 1 : 0;
   });
   EXPECT_EQ(with_pixels, 2);
   EXPECT_EQ(mapper.map().keyframes().size(), 4U);

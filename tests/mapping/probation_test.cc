@@ -76,12 +76,12 @@ TEST(KeyframeMaker, CopiesTheFrameAndItsBearings) {
   EXPECT_EQ(k.frame_number, 3U);
   EXPECT_EQ(k.utime, frame->utime);
   EXPECT_EQ(k.T_world_body.t, test::PointWorld::pose(3).t);
-  ASSERT_EQ(k.bearings.size(), frame->set.features.size());
-  for (std::size_t i = 0; i < k.bearings.size(); ++i) {
+  ASSERT_EQ(k.views[0].bearings.size(), frame->views[0].set.features.size());
+  for (std::size_t i = 0; i < k.views[0].bearings.size(); ++i) {
     Eigen::Vector2d pixel;
-    ASSERT_TRUE(w.world.rig().cameras[0].camera.project(k.bearings[i].cast<double>(), &pixel));
-    EXPECT_NEAR(pixel.x(), frame->set.features[i].u_px, 1e-2);
-    EXPECT_NEAR(pixel.y(), frame->set.features[i].v_px, 1e-2);
+    ASSERT_TRUE(w.world.rig().cameras[0].camera.project(k.views[0].bearings[i].cast<double>(), &pixel));
+    EXPECT_NEAR(pixel.x(), frame->views[0].set.features[i].u_px, 1e-2);
+    EXPECT_NEAR(pixel.y(), frame->views[0].set.features[i].v_px, 1e-2);
   }
 }
 

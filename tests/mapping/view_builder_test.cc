@@ -129,20 +129,20 @@ TEST(ViewBuilder, FullViewHoldsTheReferencesLandmarksFirst) {
 
 TEST(ViewBuilder, ReferenceIsSummarised) {
   Drive d;
-  const LandmarkHandle weak = d.w.map.keyframes()[d.k[3]].landmarks[0];
+  const LandmarkHandle weak = d.w.map.keyframes()[d.k[3]].views[0].landmarks[0];
   ASSERT_TRUE(d.w.map.landmarks().contains(weak));
   d.w.map.landmarks()[weak].state = LandmarkState::kWeak;  // confirmed by its four sightings
   const LandmarkHandle seldom = d.landmarks[2];
   ASSERT_NE(seldom, weak);
   d.w.map.landmarks()[seldom].state = LandmarkState::kWeak;
-  ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[1]));
-  ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[2]));
+  ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[1], 0));
+  ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[2], 0));
   ViewBuilder builder(d.w.config, &d.w.map);
   const auto view = builder.build(d.k[3], false);
   int confirmed = 0;
   double nearness = 0.0;
   std::vector<double> depths;
-  const Eigen::Vector3d camera = d.w.map.T_world_camera(d.w.map.keyframes()[d.k[3]]).t;
+  const Eigen::Vector3d camera = d.w.map.T_world_camera(d.w.map.keyframes()[d.k[3]], 0).t;
   for (const ViewLandmark& l : view->landmarks) {
     if (!l.in_reference) continue;
     const double depth = (l.point_w.head<3>() / l.point_w[3] - camera).norm();

@@ -121,7 +121,7 @@ TEST(Window, MeasurementsAreTheSightingsThatHaveAnError) {
 
 TEST(Window, VirtualPointsStayOutside) {
   Drive d;
-  const LandmarkHandle virtual_point = d.w.map.keyframes()[d.k[5]].landmarks[0];
+  const LandmarkHandle virtual_point = d.w.map.keyframes()[d.k[5]].views[0].landmarks[0];
   ASSERT_TRUE(d.w.map.landmarks().contains(virtual_point));
   d.w.map.landmarks()[virtual_point].state = LandmarkState::kBearing;
   Window window(d.w.config, &d.w.map, &d.w.counts);
@@ -219,7 +219,7 @@ TEST(Window, LandmarkOfOutliersGoesAndCalibrationIgnoresIt) {
   (void)window.take_back();
   EXPECT_FALSE(d.w.map.landmarks().contains(window.landmarks()[0]));
   EXPECT_EQ(d.w.counts.landmarks_culled, 1U);
-  const auto d_bearing = window.bearing_derivatives();
+  const auto d_bearing = window.bearing_derivatives(0);
   ASSERT_EQ(d_bearing.size(), p.points.size());
   EXPECT_EQ(p.points[0].measurements, 0);
   EXPECT_GT(p.points[1].measurements, 0);

@@ -85,9 +85,10 @@ SE3 nearest_truth(const tools::Trajectory& truth, double time_s) {
 // Landmarks of the map that the keyframes of the last second saw.
 std::vector<Eigen::Vector3d> landmarks_of_late(const slam::Estimator& estimator, std::int64_t now_utime) {
   std::vector<Eigen::Vector3d> points;
-  for (const slam::LandmarkInfo& l : estimator.landmarks()) {
+  const slam::Inspection inspection = estimator.inspect();
+  for (const slam::LandmarkInfo& l : inspection.landmarks()) {
     if (!l.full) continue;
-    const std::vector<slam::LandmarkSighting> sightings = estimator.sightings(l);
+    const std::vector<slam::LandmarkSighting> sightings = inspection.sightings(l);
     if (!sightings.empty() && sightings.back().utime > now_utime - 1'000'000)
       points.push_back(l.position_map);
   }

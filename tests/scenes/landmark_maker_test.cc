@@ -88,6 +88,7 @@ class LandmarkMakerTest : public ::testing::Test {
     slam::Keyframe k;
     k.T_world_body = T_world_body;
     k.map_id = 1;
+    slam::KeyframeView& view = k.views[0];
     std::vector<SimImage::Projection> visible;
     std::vector<PatchPayload> payloads;
     std::map<std::uint32_t, std::size_t> features;
@@ -98,19 +99,18 @@ class LandmarkMakerTest : public ::testing::Test {
       slam::Feature f;
       f.u_px = static_cast<float>(pixel.x()), f.v_px = static_cast<float>(pixel.y());
       f.level = static_cast<std::uint8_t>(c.level);
-      features[c.id] = k.set.features.size();
-      k.set.features.push_back(f);
-      k.set.descriptors.push_back(descriptor_of(c));
+      features[c.id] = view.set.features.size();
+      view.set.features.push_back(f);
+      view.set.descriptors.push_back(descriptor_of(c));
       Vector3d bearing;
       EXPECT_TRUE(rig_.cameras[0].camera.unproject(pixel, &bearing));
-      k.bearings.emplace_back(bearing.cast<float>());
+      view.bearings.emplace_back(bearing.cast<float>());
       visible.push_back({c.id, c.group, pixel.cast<float>()});
       payloads.push_back({c.id, frames_, 0.0F, 0.0F, c.group});
     }
-    k.landmarks.resize(k.set.features.size());
-    k.grid = slam::FeatureGrid(640, 480, 24, k.set.features.size());
-    k.grid.build(k.set.features);
-    k.image = std::make_shared<SimImage>(image_, frames_++, std::move(visible), std::move(payloads));
+    view.grid = slam::FeatureGrid(640, 480, 24, view.set.features.size());
+    view.grid.build(view.set.features);
+    view.image = std::make_shared<SimImage>(image_, frames_++, std::move(visible), std::move(payloads));
     const KeyframeHandle handle = map_->add_keyframe(std::move(k));
     EXPECT_FALSE(handle.is_null());
     features_[handle.index] = features;
@@ -126,14 +126,14 @@ class LandmarkMakerTest : public ::testing::Test {
       const auto it = features_[keyframe.index].find(c.id);
       if (it == features_[keyframe.index].end()) continue;
       if (!scaffold_landmarks_.contains(c.id)) {
-        const LandmarkHandle h = map_->add_landmark(keyframe, it->second);
+        const LandmarkHandle h = map_->add_landmark(keyframe, 0, it->second);
         ASSERT_FALSE(h.is_null());
         Landmark& l = map_->landmarks()[h];
         l.inverse_depth = 1.0 / (c.position - map_->keyframes()[keyframe].T_world_body.t).norm();
         l.state = LandmarkState::kFull;
         scaffold_landmarks_[c.id] = h;
       } else {
-        const slam::Feature& f = map_->keyframes()[keyframe].set.features[it->second];
+        const slam::Feature& f = map_->keyframes()[keyframe].views[0].set.features[it->second];
         ASSERT_TRUE(
             map_->add_observation(scaffold_landmarks_[c.id],
                                   {keyframe, static_cast<std::int32_t>(it->second), {f.u_px, f.v_px}, 0.5F}));
@@ -143,8 +143,9 @@ class LandmarkMakerTest : public ::testing::Test {
 
   [[nodiscard]] LandmarkHandle at(KeyframeHandle keyframe, std::uint32_t id) const {
     const auto it = features_.at(keyframe.index).find(id);
-    return it == features_.at(keyframe.index).end() ? LandmarkHandle{}
-                                                    : map_->keyframes()[keyframe].landmarks[it->second];
+    return it == features_.at(keyframe.index).end()
+               ? LandmarkHandle{}
+               : map_->keyframes()[keyframe].views[0].landmarks[it->second];
   }
   [[nodiscard]] const Landmark* landmark(KeyframeHandle keyframe, std::uint32_t id) const {
     return map_->landmarks().get(at(keyframe, id));

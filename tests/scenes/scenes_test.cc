@@ -92,16 +92,16 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
       run_scene(scene, 3, config,
                 [&](std::uint32_t frame, const slam::FrameResult& result, const slam::Estimator& estimator) {
                   const slam::EstimatorCounts& c = estimator.counts();
-                  EXPECT_GE(c.vmp_made, before.vmp_made);
-                  EXPECT_GE(c.vmp_promoted, before.vmp_promoted);
-                  EXPECT_GE(c.vmp_evicted, before.vmp_evicted);
+                  EXPECT_GE(c.mapping.vmp_made, before.mapping.vmp_made);
+                  EXPECT_GE(c.mapping.vmp_promoted, before.mapping.vmp_promoted);
+                  EXPECT_GE(c.mapping.vmp_evicted, before.mapping.vmp_evicted);
                   before = c;
                   // Counts come with mapping's replies: they are of the map as it is where no job is under
                   // way.
                   if (frame < 20 || result.jobs_under_way > 0) return;
                   ++compared;
                   std::uint64_t virtual_points = 0, all = 0;
-                  for (const slam::LandmarkInfo& l : estimator.landmarks()) {
+                  for (const slam::LandmarkInfo& l : estimator.inspect().landmarks()) {
                     ++all;
                     virtual_points += l.full ? 0 : 1;
                     EXPECT_FALSE(l.through_vmp && !l.full);
@@ -112,10 +112,11 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
                   EXPECT_LE(virtual_points, static_cast<std::uint64_t>(config.landmarks.max_bearing));
                   // No more are alive than were made and have not ended. (Fewer may be: a full landmark found
                   // on its corner takes a virtual one's place.)
-                  EXPECT_LE(virtual_points + c.vmp_merged + c.vmp_promoted + c.vmp_rejected + c.vmp_evicted,
-                            c.vmp_made);
+                  EXPECT_LE(virtual_points + c.mapping.vmp_merged + c.mapping.vmp_promoted +
+                                c.mapping.vmp_rejected + c.mapping.vmp_evicted,
+                            c.mapping.vmp_made);
                   // The facade says how many are alive.
-                  EXPECT_EQ(virtual_points, c.vmps) << "frame " << frame;
+                  EXPECT_EQ(virtual_points, c.mapping.vmp_alive) << "frame " << frame;
                 });
   EXPECT_GT(compared, 5);
   EXPECT_GT(r.counts.mapping.vmp_made, 300U);

@@ -142,7 +142,7 @@ TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
 TEST_F(FrontEndTest, TakesNoViewOfAMapThatItGaveUp) {
   ASSERT_TRUE(run_until_tracking());
   for (int i = 0; i < 30; ++i) run(drive_.next());
-  // A keyframe on its way, then nothing but unknown frames.
+  // A keyframe on its way, then only unknown frames.
   const TakeLimit at_once{.replies_by_delay = false};
   for (int i = 0; i < 20 && !front_end_.track(drive_.next(), at_once).keyframe; ++i) continue;
   ASSERT_GE(rings_.jobs.size(), 1U);

@@ -14,6 +14,7 @@
 #include "slam/map/frame.h"
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
+#include "slam/map/request.h"
 #include "slam/mapping/counts.h"
 #include "slam/mapping/keyframe_maker.h"
 
@@ -109,6 +110,7 @@ class PointWorld {
     auto frame = std::make_shared<slam::Frame>();
     frame->number = number;
     frame->utime = static_cast<std::int64_t>(number) * 100000;
+    slam::FrameView& view = frame->views[0];
     const auto image = std::make_shared<PointImage>();
     const slam::RigCamera& camera = rig_.cameras[0];
     const slam::SE3 T_camera_world = (T_world_body * camera.T_body_camera).inverse();
@@ -118,20 +120,20 @@ class PointWorld {
       if (!camera.camera.in_image(pixel, 12.0)) continue;
       slam::Feature f;
       f.u_px = static_cast<float>(pixel.x()), f.v_px = static_cast<float>(pixel.y());
-      frame->set.features.push_back(f);
-      frame->set.descriptors.push_back(descriptors_[i]);
+      view.set.features.push_back(f);
+      view.set.descriptors.push_back(descriptors_[i]);
       image->add(i, pixel.cast<float>());
     }
-    frame->grid = slam::FeatureGrid(640, 480, 24, frame->set.features.size());
-    frame->grid.build(frame->set.features);
-    frame->image = image;
+    view.grid = slam::FeatureGrid(640, 480, 24, view.set.features.size());
+    view.grid.build(view.set.features);
+    view.image = image;
     return frame;
   }
   [[nodiscard]] std::shared_ptr<slam::Frame> frame(int step, std::uint32_t points = kPoints) const {
     return frame(pose(step), static_cast<std::uint64_t>(step), points);
   }
   [[nodiscard]] static PointImage& image(const slam::Frame& frame) {
-    return const_cast<PointImage&>(dynamic_cast<const PointImage&>(*frame.image));
+    return const_cast<PointImage&>(dynamic_cast<const PointImage&>(*frame.views[0].image));
   }
 
   // Both frames at their true relative pose, with every point that both show.
@@ -160,7 +162,7 @@ class PointWorld {
       const std::uint32_t point = point_of(l.patch);
       if (!image(*r.frame).shows(point)) continue;
       const std::size_t feature = image(*r.frame).feature_of(point);
-      const slam::Feature& f = r.frame->set.features[feature];
+      const slam::Feature& f = r.frame->views[0].set.features[feature];
       r.sightings.push_back({l.handle, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.5F});
       r.counts.push_back({l.handle, 2, 1});
     }
@@ -208,11 +210,11 @@ class MappedWorld {
     for (const slam::KeyframeHandle& k : observers)
       if (!image(k).shows(point)) return {};
     const slam::KeyframeHandle host = observers.front();
-    const slam::LandmarkHandle handle = map.add_landmark(host, image(host).feature_of(point));
+    const slam::LandmarkHandle handle = map.add_landmark(host, 0, image(host).feature_of(point));
     if (handle.is_null()) return handle;
     slam::Landmark& l = map.landmarks()[handle];
     l.state = slam::LandmarkState::kFull;
-    const slam::SE3 T_camera_world = map.T_world_camera(map.keyframes()[host]).inverse();
+    const slam::SE3 T_camera_world = map.T_world_camera(map.keyframes()[host], 0).inverse();
     l.inverse_depth = 1.0 / (T_camera_world * world.point_w(point)).norm();
     l.inverse_depth_sigma = 0.001;
     for (std::size_t i = 1; i < observers.size(); ++i) add_sighting(handle, point, observers[i]);
@@ -220,7 +222,7 @@ class MappedWorld {
   }
   void add_sighting(slam::LandmarkHandle landmark, std::uint32_t point, slam::KeyframeHandle keyframe) {
     const std::size_t feature = image(keyframe).feature_of(point);
-    const slam::Feature& f = map.keyframes()[keyframe].set.features[feature];
+    const slam::Feature& f = map.keyframes()[keyframe].views[0].set.features[feature];
     map.add_observation(landmark, {keyframe, static_cast<std::int32_t>(feature), {f.u_px, f.v_px}, 0.5F});
   }
   // Landmarks of the points [from, to) that all observers show.
@@ -243,7 +245,7 @@ class MappedWorld {
     return PointWorld::kPoints;
   }
   [[nodiscard]] slam::LandmarkHandle landmark_at(slam::KeyframeHandle keyframe, std::uint32_t point) const {
-    return map.keyframes()[keyframe].landmarks[image(keyframe).feature_of(point)];
+    return map.keyframes()[keyframe].views[0].landmarks[image(keyframe).feature_of(point)];
   }
   void update_covisibility(const std::vector<slam::KeyframeHandle>& keyframes) {
     for (const slam::KeyframeHandle& k : keyframes) map.update_covisibility(k);

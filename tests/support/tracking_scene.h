@@ -131,13 +131,23 @@ class TrackingScene {
     return v;
   }
 
-  // The frame of a body at this pose, with its features in random order.
-  [[nodiscard]] SceneFrame look(const SE3& T_world_body, std::int64_t utime) {
+  // The frame of a body at this pose by one camera, with its features in random order.
+  [[nodiscard]] SceneFrame look(const SE3& T_world_body, std::int64_t utime, int camera = 0) {
     SceneFrame out;
     out.frame = std::make_shared<Frame>();
     out.frame->utime = utime;
     out.frame->number = frames_++;
-    const SE3 T_camera_world = (T_world_body * rig.cameras[0].T_body_camera).inverse();
+    out.frame->views = PerCamera<FrameView>(static_cast<int>(rig.cameras.size()));
+    show(T_world_body, camera, &out);
+    return out;
+  }
+
+  // Adds what another camera shows. Points and features of `out` are then those of this camera.
+  void show(const SE3& T_world_body, int index, SceneFrame* shown) {
+    SceneFrame& out = *shown;
+    FrameView& view = out.frame->views[index];
+    const RigCamera& rig_camera = rig.cameras[static_cast<std::size_t>(index)];
+    const SE3 T_camera_world = (T_world_body * rig_camera.T_body_camera).inverse();
     const SE3 T_world_host = T_world_reference * rig.cameras[0].T_body_camera;
     std::vector<SceneImage::Target> targets(points.size());
     std::vector<std::pair<Feature, int>> features;
@@ -145,7 +155,8 @@ class TrackingScene {
       const ScenePoint& p = points[i];
       const Eigen::Vector3d p_c = T_camera_world * p.position_w;
       Eigen::Vector2d pixel;
-      if (!p.visible || !camera().project(p_c, &pixel) || !camera().in_image(pixel)) continue;
+      if (!p.visible || !rig_camera.camera.project(p_c, &pixel) || !rig_camera.camera.in_image(pixel))
+        continue;
       targets[i] = {p.aligns, (pixel + p.alignment_offset_px).cast<float>()};
       Feature f;
       f.u_px = static_cast<float>(pixel.x() + p.corner_offset_px.x());
@@ -157,20 +168,20 @@ class TrackingScene {
       features.emplace_back(f, static_cast<int>(i));
     }
     std::shuffle(features.begin(), features.end(), random_);
+    out.point_of_feature.clear();
     out.feature_of_point.assign(points.size(), -1);
     for (const auto& [feature, point] : features) {
       out.feature_of_point[static_cast<std::size_t>(point)] = static_cast<int>(out.point_of_feature.size());
       out.point_of_feature.push_back(point);
-      out.frame->set.features.push_back(feature);
+      view.set.features.push_back(feature);
       // A few bits differ, as they do from image to image.
       Descriptor d = points[static_cast<std::size_t>(point)].descriptor;
       d.words[random_() % 4] ^= std::uint64_t{7} << (random_() % 60);
-      out.frame->set.descriptors.push_back(d);
+      view.set.descriptors.push_back(d);
     }
-    out.frame->image = std::make_shared<SceneImage>(std::move(targets));
-    out.frame->grid = FeatureGrid(camera().width_px(), camera().height_px(), 24, 4000);
-    out.frame->grid.build(out.frame->set.features);
-    return out;
+    view.image = std::make_shared<SceneImage>(std::move(targets));
+    view.grid = FeatureGrid(rig_camera.camera.width_px(), rig_camera.camera.height_px(), 24, 4000);
+    view.grid.build(view.set.features);
   }
 
   // Adds another point with its own handle: at a pixel of the reference's image, at a distance.

@@ -131,7 +131,7 @@ TEST_F(InitialiserTest, KeepsThePixelsOfReferenceNewestAndEverySecondFrameSinceH
   for (int i = 0; i <= 10; ++i) (void)add(SE3{});
   std::vector<std::uint64_t> with_pixels;
   for (const auto& f : initialiser->history())
-    if (f->image != nullptr) with_pixels.push_back(f->number);
+    if (f->has_pixels()) with_pixels.push_back(f->number);
   EXPECT_EQ(with_pixels, (std::vector<std::uint64_t>{0, 6, 8, 10}));
 }
 

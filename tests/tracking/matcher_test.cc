@@ -132,7 +132,7 @@ TEST_F(MatcherTest, MatchesEachLandmarkWithTheFeatureThatShowsIt) {
   for (const Match& m : matcher.matches()) {
     const auto f = static_cast<std::size_t>(m.feature);
     ASSERT_EQ(shown.point_of_feature[f], static_cast<int>(m.view_index));
-    const Feature& feature = shown.frame->set.features[f];
+    const Feature& feature = shown.frame->views[0].set.features[f];
     EXPECT_EQ(m.pixel, Eigen::Vector2f(feature.u_px, feature.v_px));
     EXPECT_FLOAT_EQ(m.sigma_px, std::pow(1.2F, static_cast<float>(feature.level)));
     EXPECT_TRUE(m.inlier);
@@ -185,8 +185,8 @@ TEST_F(MatcherTest, ALandmarkHasOneFeatureAndASecondSearchKeepsIt) {
 
 TEST_F(MatcherTest, AFeatureIsAddedOnce) {
   look(SE3{});
-  matcher.add(*shown.frame, 5, shown.feature_of_point[5]);
-  matcher.add(*shown.frame, 6, shown.feature_of_point[5]);
+  matcher.add(*shown.frame, 5, 0, shown.feature_of_point[5]);
+  matcher.add(*shown.frame, 6, 0, shown.feature_of_point[5]);
   ASSERT_EQ(matcher.matches().size(), 1U);
   EXPECT_EQ(matcher.matches()[0].view_index, 5U);
   matcher.match(*shown.frame, 4.0, 0.9F);
@@ -263,7 +263,7 @@ TEST_F(MatcherTest, WithoutPixelsTheCornersStay) {
   look(SE3{});
   matcher.match(*shown.frame, 4.0, 0.9F);
   const std::size_t matches = matcher.matches().size();
-  shown.frame->image.reset();
+  shown.frame->drop_pixels();
   matcher.align(*shown.frame);
   EXPECT_EQ(matcher.matches().size(), matches);
   EXPECT_FALSE(matcher.matches()[0].aligned);

@@ -199,7 +199,7 @@ TEST_F(TrackerTest, SightingsNameLandmarkFeatureAndPixel) {
     const int point = shown.point_of_feature[static_cast<std::size_t>(s.feature)];
     ASSERT_GE(point, 0);
     EXPECT_EQ(s.landmark, scene.points[static_cast<std::size_t>(point)].handle);
-    const Feature& f = shown.frame->set.features[static_cast<std::size_t>(s.feature)];
+    const Feature& f = shown.frame->views[0].set.features[static_cast<std::size_t>(s.feature)];
     EXPECT_LT((s.pixel - Eigen::Vector2f(f.u_px - 0.5F, f.v_px + 0.7F)).norm(), 1e-3F);
     EXPECT_FLOAT_EQ(s.sigma_px, std::hypot(0.1F, 0.5F));
   }

@@ -70,7 +70,7 @@ TEST(EpochPredictor, AQuarterOfASecondAfterTheImageNothingIsValid) {
   EXPECT_TRUE(predictor.at(kImage_us + 250'000).pose_valid);
   const ipc::OdometryEpoch e = predictor.at(kImage_us + 250'001);
   EXPECT_FALSE(e.pose_valid || e.velocity_valid || e.from_vision);
-  EXPECT_EQ(e.state, int{status_t::STATE_LOST});  // not 'tracking' any more, whoever hangs
+  EXPECT_EQ(e.state, int{status_t::STATE_LOST});  // not 'tracking' any more, whichever thread hangs
   EXPECT_EQ(e.reason, ipc::CanReason::kNoPoseInTime);
   EXPECT_EQ(e.quality, -1);
 }

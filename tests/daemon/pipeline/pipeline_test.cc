@@ -11,7 +11,7 @@
 namespace farpoint::daemon {
 namespace {
 
-// Gives so many images, `pause` apart, then ends or throws.
+// Gives N images, `pause` apart, then ends or throws.
 class HandMadeSource final : public CaptureSource {
  public:
   HandMadeSource(int images, std::chrono::microseconds pause) : images_(images), pause_(pause) {

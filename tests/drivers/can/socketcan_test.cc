@@ -181,7 +181,7 @@ TEST_F(SocketCanPair, AFrameIsInFlightUntilTheControllerConfirmsIt) {
   EXPECT_EQ(can_->counts().confirmed, 1U);
 }
 
-// The kernel drops what it held: to wait for its confirmation would be to be silent for ever.
+// The kernel drops the queue: waiting for its confirmation would silence the bus without end.
 TEST_F(SocketCanPair, AfterTheControllerStartedAnewNothingIsInFlight) {
   CanOptions options;
   options.confirm = true;

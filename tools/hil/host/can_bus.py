@@ -164,7 +164,7 @@ class Receiver:
         return self._invalid_is_empty(epochs), [f"{len(epochs)} epochs, {valid:.0f} valid, {rate}, {age}"]
 
     def _every(self, identifier):
-        """The frame goes out with every so many epochs."""
+        """The frame goes out with every Nth epoch; returns N."""
         return round(self.messages[identifier].cycle_ms / self.messages[self.status].cycle_ms)
 
     def _complete(self, epochs):
