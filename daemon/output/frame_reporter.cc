@@ -43,7 +43,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
     silence_.result = since_odom_reset(result);
     frame_ = make_frame_output(silence_.result, assumed_scale_);
     frame_.age_us = package->chance.age_us;
-    frame_.calibration_contradicted = package->counts.calibration_contradicted;
+    frame_.calibration_contradicted = package->counts.mapping.calibration_contradicted;
     frame_.boot_counter = status_.boot_counter;
     if (package->due_s > 0.0) frame_.age_at_s = package->due_s + 1e-6 * static_cast<double>(frame_.age_us);
     ++status_.frames_tracked;

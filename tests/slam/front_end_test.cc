@@ -147,8 +147,15 @@ TEST_F(FrontEndTest, TakesNoViewOfAMapThatItGaveUp) {
   int lost = 0;
   while (front_end_.track(drive_.next_unknown(), none).state != State::kInitialising) ASSERT_LT(++lost, 40);
   const std::uint64_t before = front_end_.track(drive_.next_unknown(), none).taken.replies;
-  work();
+  std::vector<std::shared_ptr<const LocalView>> views;
+  while (back_end_.step()) {
+    if (back_end_.reply().view) views.push_back(back_end_.reply().view);
+    back_end_.hand_over();
+  }
+  ASSERT_EQ(views.size(), 2U) << "quick and full view of the keyframe";
   const FrameResult& after = front_end_.track(drive_.next_unknown(), at_once);
+  for (const auto& view : views)
+    EXPECT_EQ(view.use_count(), 2) << "in use by tracking, beside the pool and here";
   EXPECT_GT(after.taken.replies, before) << "replies are taken all the same";
   EXPECT_EQ(after.state, State::kInitialising);
   EXPECT_FALSE(after.has_pose);
