@@ -56,6 +56,7 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
     if (status != ipc::ImageStatus::kOk) continue;
     *frame = {item.utime, item.image->sequence, &image_};
     gave_image_ = true;
+    given_utime_ = item.utime;
     return true;
   }
   if (!source_.damage().read_error.empty()) {
@@ -66,9 +67,26 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
 }
 
 void LogFrameSource::feed(const drivers::LogItem& item) {
-  if (feed_ == nullptr) return;
+  if (feed_ == nullptr) return keep_early(item);
   if (item.kind == drivers::LogItemKind::kImu) feed_->add(*item.imu);
   if (item.kind == drivers::LogItemKind::kWheels) feed_->add(*item.wheels);
+}
+
+void LogFrameSource::keep_early(const drivers::LogItem& item) {
+  if (item.kind == drivers::LogItemKind::kImu) early_imu_.push_back(*item.imu);
+  if (item.kind == drivers::LogItemKind::kWheels) early_wheels_.push_back(*item.wheels);
+  if (early_imu_.size() > kEarly) early_imu_.pop_front();
+  if (early_wheels_.size() > kEarly) early_wheels_.pop_front();
+}
+
+void LogFrameSource::feed_to(MeasurementFeed* feed) {
+  feed_ = feed;
+  for (const imu_t& m : early_imu_)
+    if (m.utime > given_utime_) feed_->add(m);
+  for (const wheels_t& m : early_wheels_)
+    if (m.utime > given_utime_) feed_->add(m);
+  early_imu_ = {};
+  early_wheels_ = {};
 }
 
 void LogFrameSource::take_calibration(const calibration_t& calibration) {

@@ -1,6 +1,8 @@
 // A recorded log as a source of frames.
 #pragma once
 
+#include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,9 +21,10 @@ class LogFrameSource final : public FrameSource {
   // Throws InputError at the end of a log without any accepted image. The line names the cause: no
   // calibration, no such camera, nothing decodable.
   [[nodiscard]] bool next(SourceFrame* frame, StageClock* clock) override;
-  // After the first image. From now on next() feeds the IMU and WHEELS messages that it reads on its way to
-  // an image. Earlier ones are passed over: no frame precedes them. `feed` outlives its use.
-  void feed_to(MeasurementFeed* feed) { feed_ = feed; }
+  // After the first image. Feeds the IMU and WHEELS messages read so far, and from now on those that next()
+  // reads on its way to an image. Passes over messages not after the first image: no frame precedes them.
+  // `feed` outlives its use.
+  void feed_to(MeasurementFeed* feed);
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
@@ -38,6 +41,7 @@ class LogFrameSource final : public FrameSource {
  private:
   void take_calibration(const calibration_t& calibration);
   void feed(const drivers::LogItem& item);
+  void keep_early(const drivers::LogItem& item);
   [[noreturn]] void refuse_empty() const;
 
   std::string name_;
@@ -48,6 +52,12 @@ class LogFrameSource final : public FrameSource {
   std::int64_t before_calibration_ = 0, wrong_size_decoded_ = 0;
   bool gave_image_ = false;
   MeasurementFeed* feed_ = nullptr;
+  // Read before feed_to(), the newest kEarly of each: the source may read beyond the first image before it
+  // gives it.
+  static constexpr std::size_t kEarly = 1024;
+  std::deque<imu_t> early_imu_;
+  std::deque<wheels_t> early_wheels_;
+  std::int64_t given_utime_ = 0;  // of the last image of next()
   ipc::GreyImage image_;
   double file_bytes_ = -1.0;
   std::uint64_t offset_ = 0;

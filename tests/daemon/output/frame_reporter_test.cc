@@ -66,7 +66,7 @@ TEST_F(FrameReporterTest, TheStatusComesAtItsRateAndAtEachChangeOfState) {
   report(lost);
   const auto status = kept_.of<status_t>(ipc::kStatusChannel);
   ASSERT_EQ(status.size(), 2U);
-  EXPECT_EQ(status[1].state, status_t::STATE_LOST);
+  EXPECT_EQ(status[1].state, std::int8_t{status_t::STATE_LOST});
   EXPECT_EQ(status[1].frames_tracked, 11);
   EXPECT_EQ(status[1].frames_valid, 10);
   EXPECT_EQ(status[1].memory_pool_bytes, 4321);
@@ -148,7 +148,7 @@ TEST_F(FrameReporterTest, WithoutCameraNoPoseIsSentAndTheStatusSaysWhy) {
   EXPECT_FALSE(first_.frames[1].result.has_pose);
   EXPECT_EQ(first_.frames[1].result.state, slam::State::kNoCamera);
   const auto status = kept_.of<status_t>(ipc::kStatusChannel);
-  EXPECT_EQ(status.back().state, status_t::STATE_NO_CAMERA);
+  EXPECT_EQ(status.back().state, std::int8_t{status_t::STATE_NO_CAMERA});
   EXPECT_EQ(status.back().frames_tracked, 1) << "silence is no frame";
 }
 

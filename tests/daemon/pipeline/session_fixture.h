@@ -7,6 +7,7 @@
 
 #include "daemon/config/rig.h"
 #include "daemon/pipeline/session.h"
+#include "ipc/image_codec.h"
 #include "tests/daemon/output/published.h"
 #include "tests/daemon/synthetic_log.h"
 
@@ -20,7 +21,7 @@ class SessionFixture : public ::testing::Test {
     config_.realtime.capture_queue = 3;
     publisher_.add(std::make_unique<test::KeptMessageSink>(&kept_));
     session_ = std::make_unique<Session>(config_, make_rig(test::synthetic_calibration(), 0), "calibration",
-                                         std::vector<PoseSink*>{&sink_}, &publisher_, true);
+                                         7, std::vector<PoseSink*>{&sink_}, &publisher_, true);
   }
   [[nodiscard]] static ipc::GreyImage grey(int number) {
     const image_t image = test::synthetic_image({}, number);

@@ -67,12 +67,13 @@ TEST_F(SessionTest, FinishPublishesTheRunsResultsWithWhatWasRefused) {
 
 TEST_F(SessionTest, ARecordedFrameTakesNoMoreOfMappingThanItTookThen) {
   RecordedChance nothing_taken;
+  nothing_taken.chance.features_asked = 400;
   for (int i = 0; i < 30; ++i) {
     const FrameOutput& frame = process(i, &nothing_taken);
     EXPECT_EQ(frame.result.taken.replies, 0U);
     EXPECT_EQ(frame.result.state, slam::State::kInitialising);
   }
-  RecordedChance first_view;
+  RecordedChance first_view = nothing_taken;
   first_view.taken.replies = 1;
   first_view.chance.age_us = 1234;
   const FrameOutput& frame = process(30, &first_view);
