@@ -180,7 +180,7 @@ class TrackingScene {
     return points.emplace_back(p);
   }
 
-  // Gives each point a double that looks like it, at least 200 px away and well inside the image, for which
+  // Gives each point a double that looks like it, at least 140 px away and well inside the image, for which
   // nothing searches: only a window around the right place tells the two apart.
   void add_doubles() {
     const SE3 T_camera_world = (T_world_reference * rig.cameras[0].T_body_camera).inverse();
@@ -188,7 +188,7 @@ class TrackingScene {
       const ScenePoint point = points[i];
       Eigen::Vector2d pixel;
       EXPECT_TRUE(camera().project(T_camera_world * point.position_w, &pixel));
-      const double u_px = pixel.x() < 320 ? 340 + 0.56 * pixel.x() : 120 + 0.56 * (pixel.x() - 320);
+      const double u_px = pixel.x() < 320 ? 340 + 0.4 * pixel.x() : 120 + 0.4 * (pixel.x() - 320);
       ScenePoint& twin = add_point({u_px, 60 + 0.75 * (480 - pixel.y())}, 20);
       twin.descriptor = point.descriptor;
       twin.confirmed = false;
