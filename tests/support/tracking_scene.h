@@ -191,6 +191,21 @@ class TrackingScene {
     return points.emplace_back(p);
   }
 
+  // Gives each point a double that looks like it, at least 140 px away and well inside the image, for which
+  // nothing searches: only a window around the right place tells the two apart.
+  void add_doubles() {
+    const SE3 T_camera_world = (T_world_reference * rig.cameras[0].T_body_camera).inverse();
+    for (std::size_t i = 0, n = points.size(); i < n; ++i) {
+      const ScenePoint point = points[i];
+      Eigen::Vector2d pixel;
+      EXPECT_TRUE(camera().project(T_camera_world * point.position_w, &pixel));
+      const double u_px = pixel.x() < 320 ? 340 + 0.4 * pixel.x() : 120 + 0.4 * (pixel.x() - 320);
+      ScenePoint& twin = add_point({u_px, 60 + 0.75 * (480 - pixel.y())}, 20);
+      twin.descriptor = point.descriptor;
+      twin.confirmed = false;
+    }
+  }
+
   [[nodiscard]] const Camera& camera() const { return rig.cameras[0].camera; }
   double uniform(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);

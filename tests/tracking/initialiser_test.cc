@@ -97,12 +97,19 @@ TEST_F(InitialiserTest, RenewsItsReferenceAfterTheConfiguredFrames) {
   EXPECT_EQ(pair->first->number, 4U);  // half way between frame 0 and frame 7
 }
 
+// In all 100 px, more than the window of 51 px: each search starts where the last one found the corner.
 TEST_F(InitialiserTest, FollowsCornersOverManyFrames) {
-  // In all 100 px, more than the window of 51 px: each search starts where the last one found the corner.
-  scene.config.initialisation.min_parallax_rad = 0.5;  // no pair, so that the reference stays
-  initialiser.emplace(scene.config, scene.rig);
   for (int i = 0; i <= 6; ++i) (void)add(TrackingScene::pose({0, 0, 0}, {0, 0, 0.04 * i}));
-  EXPECT_GT(initialiser->last_matches(), 200);
+  const std::optional<InitialPair> pair = add(TrackingScene::pose({0.1, 0.8, 0}, {0, 0, 0.24}));
+  ASSERT_TRUE(pair.has_value());
+  EXPECT_EQ(pair->first, frames[0].frame);
+}
+
+TEST_F(InitialiserTest, AsksForTheConfiguredParallax) {
+  scene.config.initialisation.min_parallax_rad = 0.3;  // 0.8 units aside at 4 units are 0.2 rad
+  initialiser.emplace(scene.config, scene.rig);
+  (void)add(aside(0));
+  EXPECT_FALSE(add(aside(0.8)).has_value());
 }
 
 TEST_F(InitialiserTest, RemembersTheLastSixtyFramesOldestFirst) {

@@ -183,6 +183,9 @@ TEST_F(TrackerTest, SaysWhenItsMatchesContradictThePose) {
   const TrackOutcome out = track(1);
   EXPECT_TRUE(out.ok);
   EXPECT_FALSE(out.agreed());
+  std::vector<Sighting> sightings;
+  tracker.sightings(&sightings);
+  EXPECT_EQ(static_cast<int>(sightings.size()), out.inliers);
 }
 
 // --- what it hands to mapping
@@ -287,22 +290,8 @@ TEST_F(TrackerTest, PosesFramesOfAnotherTrackerWithoutMovingItself) {
 // --- after a loss
 // --------------------------------------------------------------------------------------------------
 
-// Every point has a double that looks like it elsewhere in the image: only a window around the right pose
-// tells them apart.
 class TrackerTrialTest : public TrackerTest {
  protected:
-  TrackerTrialTest() {
-    const SE3 T_camera_world = scene.rig.cameras[0].T_body_camera.inverse();
-    for (std::size_t i = 0, n = scene.points.size(); i < n; ++i) {
-      const ScenePoint point = scene.points[i];
-      Eigen::Vector2d pixel;
-      EXPECT_TRUE(scene.camera().project(T_camera_world * point.position_w, &pixel));
-      ScenePoint& twin =
-          scene.add_point({pixel.x() < 320 ? pixel.x() + 300 : pixel.x() - 300, 480 - pixel.y()}, 20);
-      twin.descriptor = point.descriptor;
-      twin.confirmed = false;
-    }
-  }
   void accept_wrong_trial() {
     start();
     for (const int n : {1, 2}) track_and_accept(n);
@@ -315,12 +304,37 @@ class TrackerTrialTest : public TrackerTest {
 };
 
 TEST_F(TrackerTrialTest, SearchesFromTheConfirmedPoseAndNotFromTheOneOnTrial) {
+  scene.add_doubles();
   accept_wrong_trial();
   EXPECT_LT(error_of(tracker.T_world_body(), TrackingScene::pose({20, 5, 0}, {0, 0, 2})), 1e-9);
   shown = scene.look(drive(4), 4 * kFrame_us);
   const TrackOutcome out = tracker.relocalise(*shown.frame);
   ASSERT_TRUE(out.ok);
   EXPECT_LT(error_of(out.T_world_body, drive(4)), 1e-3);
+}
+
+// What the trial saw has moved together since, which gives another pose with more matches.
+TEST_F(TrackerTrialTest, BelievesTheLandmarksOfTheConfirmedFrameAndNotThoseOfTheTrial) {
+  const auto show = [this](bool confirmed_ones, bool others) {
+    for (std::size_t i = 0; i < scene.points.size(); ++i) {
+      scene.points[i].in_reference = false;
+      scene.points[i].visible = i % 3 == 0 ? confirmed_ones : others;
+    }
+  };
+  show(true, false);
+  start();
+  for (const int n : {1, 2}) track_and_accept(n);
+  show(false, true);
+  const TrackOutcome trial = track(3);
+  ASSERT_TRUE(trial.ok);
+  tracker.accept_on_trial(*shown.frame, trial);
+  show(true, true);
+  for (std::size_t i = 0; i < scene.points.size(); ++i)
+    if (i % 3 != 0) scene.points[i].position_w += Eigen::Vector3d(0, 0.6, 0.3);
+  shown = scene.look(drive(4), 4 * kFrame_us);
+  const TrackOutcome out = tracker.relocalise(*shown.frame);
+  ASSERT_TRUE(out.ok);
+  EXPECT_LT(error_of(out.T_world_body, drive(4)), 5e-3);
 }
 
 TEST_F(TrackerTrialTest, TheNextFrameGoesOnFromThePoseOnTrial) {
