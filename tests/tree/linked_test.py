@@ -23,7 +23,8 @@ OPENCV = {"opencv_core", "opencv_features2d", "opencv_flann", "opencv_imgproc", 
           "Xau", "Xdmcp", "bsd", "md", "lapack", "blas", "f77blas", "cblas", "atlas", "openblas", "openblasp", "gfortran",
           "quadmath", "gomp"}
 LIBCAMERA = {"camera", "camera-base", "gnutls", "udev", "yaml-0", "p11-kit", "idn2", "unistring", "tasn1", "nettle",
-             "hogweed", "gmp", "ffi", "lttng-ust", "lttng-ust-common", "lttng-ust-tracepoint", "numa", "boost_filesystem"}
+             "hogweed", "gmp", "ffi", "lttng-ust", "lttng-ust-common", "lttng-ust-tracepoint", "numa",
+             "boost_filesystem", "dw", "elf", "bz2", "unwind"}
 CERES = {"cholmod", "cxsparse", "glog", "gflags", "unwind", "lapack", "blas", "f77blas", "cblas", "atlas", "openblas",
          "openblasp", "gfortran", "quadmath", "gomp", "amd", "camd", "colamd", "ccolamd", "metis", "suitesparseconfig",
          "spqr", "tbb", "hwy"}
