@@ -214,6 +214,43 @@ TEST(SchurSolverWithFactors, EndsWhereCeresEnds) {
   EXPECT_GT((a.globals[1].value - s.scene.start.globals[1].value).norm(), 1e-3);  // it moved
 }
 
+// Ten times the arc tangent of a number and of a velocity: from 3, Gauss-Newton goes beyond -9.
+class OvershootFactor final : public StateFactor {
+ public:
+  [[nodiscard]] std::span<const StateBlock> blocks() const override { return blocks_; }
+  [[nodiscard]] int residuals() const override { return 2; }
+  void evaluate(const StateWindow& s, FactorResidual* r, FactorJacobian* J) const override {
+    const double x = s.global(0).value.x(), v = s.motion(0).velocity_world.x();
+    *r << 10.0 * std::atan(x), 10.0 * std::atan(v);
+    if (J == nullptr) return;
+    (*J)(0, 0) = 10.0 / (1.0 + x * x);
+    (*J)(1, 1) = 10.0 / (1.0 + v * v);
+  }
+
+ private:
+  std::array<StateBlock, 2> blocks_{StateBlock::global(0), StateBlock::motion(0)};
+};
+
+TEST(SchurSolverWithFactors, ARefusedStepLeavesAllStatesWhereTheyWere) {
+  const Rig rig;
+  const OvershootFactor factor;
+  BundleProblem start;
+  start.rig = &rig;
+  start.globals = {GlobalState::real(3.0)};
+  start.motions.resize(1);
+  start.motions[0].velocity_world.x() = 3.0;
+  start.factors = {&factor};
+  BundleProblem p = start;
+  const BundleSummary one = solve_schur({1, 1e-9}, &p);
+  EXPECT_EQ(one.final_cost, one.initial_cost);
+  EXPECT_EQ(p.globals[0].value.x(), 3.0);
+  EXPECT_EQ(p.motions[0].velocity_world.x(), 3.0);
+  const BundleSummary all = solve_schur({60, 1e-15}, &p);
+  EXPECT_LT(all.final_cost, 1e-12);
+  EXPECT_NEAR(p.globals[0].value.x(), 0.0, 1e-6);
+  EXPECT_NEAR(p.motions[0].velocity_world.x(), 0.0, 1e-6);
+}
+
 TEST(SchurSolverWithFactors, FixedStatesStay) {
   DriftScene s(small_scene());
   BundleProblem p = s.scene.start;

@@ -326,6 +326,41 @@ TEST_F(PoseSolverTest, InBetweenItIsTheMeanWeightedByInformation) {
   }
 }
 
+// Far apart, so that one step does not do: the end is where images and prior pull alike.
+TEST_F(PoseSolverTest, ImagesAndPriorBalanceWhereTheSolveEnds) {
+  for (int i = 0; i < 20; ++i) {
+    const SE3 truth = random_pose();
+    PointOptions exact;
+    exact.noise_px = 0.0;
+    auto measurements = sightings(120, truth, exact);
+    for (PoseMeasurement& m : measurements) m.sigma_px = 40.0;  // all take part from afar
+    PosePrior prior;
+    prior.T_world_body = disturbed(truth, 0.1, 0.05);
+    prior.information = 2e4 * Matrix6d::Identity();
+    const PoseSolution s = solve_pose(rig, prior, measurements);
+    ASSERT_TRUE(s.ok);
+    ASSERT_EQ(s.inliers, 120);
+    Vector6d r, of_prior, of_images = Vector6d::Zero();
+    Matrix6d J;
+    prior_residual(prior.T_world_body, s.T_world_body, &r, &J);
+    of_prior = J.transpose() * prior.information * r;
+    Matrix6d H = J.transpose() * prior.information * J;
+    for (const PoseMeasurement& m : measurements) {
+      Eigen::Vector2d residual_px, unused;
+      Eigen::Matrix<double, 2, 6> d_pose;
+      ASSERT_TRUE(pose_residual(rig, s.T_world_body, m, &residual_px, &d_pose, &unused));
+      of_images += d_pose.transpose() * residual_px / (m.sigma_px * m.sigma_px);
+      H += d_pose.transpose() * d_pose / (m.sigma_px * m.sigma_px);
+    }
+    // In sigmas: the distance that is left, and the pull of each side.
+    const auto sigmas = [&H](const Vector6d& gradient) {
+      return std::sqrt(gradient.dot(H.ldlt().solve(gradient)));
+    };
+    EXPECT_LT(sigmas(of_prior + of_images), 0.05) << i;
+    EXPECT_GT(sigmas(of_prior), 0.5) << i;
+  }
+}
+
 TEST_F(PoseSolverTest, WithAPriorAllocatesNothing) {
   if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
   const SE3 truth = random_pose();
