@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "slam/config.h"
-#include "slam/map/request.h"
 #include "slam/map/local_view.h"
+#include "slam/map/request.h"
 #include "slam/mapping/counts.h"
 #include "slam/spsc_ring.h"
 

@@ -1,4 +1,5 @@
-// A receiver on the other end of a socket that stands for the bus: it decodes by the DBC file and confirms frames.
+// A receiver on the other end of a socket that stands for the bus: it decodes by the DBC file and confirms
+// frames.
 #pragma once
 
 #include <linux/can.h>
