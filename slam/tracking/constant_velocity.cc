@@ -20,6 +20,12 @@ Motion moved(const Motion& from, const SE3& T_world_body, std::int64_t utime, do
   return to;
 }
 
+const ViewKeyframe* find_keyframe(const LocalView& view, std::uint64_t id) {
+  const auto k = std::find_if(view.keyframes.begin(), view.keyframes.end(),
+                              [&](const ViewKeyframe& keyframe) { return keyframe.id == id; });
+  return k != view.keyframes.end() ? &*k : nullptr;
+}
+
 }  // namespace
 
 double seconds_between(std::int64_t from_utime, std::int64_t to_utime) {
@@ -40,14 +46,13 @@ void ConstantVelocity::start(const SE3& T_world_body, std::int64_t utime) {
 
 void ConstantVelocity::correct(const LocalView& before, const LocalView& after) {
   if (before.map_id != after.map_id) return;
-  for (auto old = before.keyframes.rbegin(); old != before.keyframes.rend(); ++old) {
-    const auto now = std::find_if(after.keyframes.begin(), after.keyframes.end(),
-                                  [&](const ViewKeyframe& k) { return k.id == old->id; });
-    if (now == after.keyframes.end()) continue;
-    for (Motion* m : {&newest_, &confirmed_})
-      m->T_world_body = now->T_world_body * (old->T_world_body.inverse() * m->T_world_body);
-    return;
-  }
+  const auto common =
+      std::find_if(before.keyframes.rbegin(), before.keyframes.rend(),
+                   [&](const ViewKeyframe& k) { return find_keyframe(after, k.id) != nullptr; });
+  if (common == before.keyframes.rend()) return;
+  const ViewKeyframe &was = *common, &is = *find_keyframe(after, common->id);
+  for (Motion* m : {&newest_, &confirmed_})
+    m->T_world_body = is.T_world_body * (was.T_world_body.inverse() * m->T_world_body);
 }
 
 void ConstantVelocity::accept(const SE3& T_world_body, std::int64_t utime) {

@@ -195,8 +195,8 @@ class TrackingScene {
   // nothing searches: only a window around the right place tells the two apart.
   void add_doubles() {
     const SE3 T_camera_world = (T_world_reference * rig.cameras[0].T_body_camera).inverse();
-    for (std::size_t i = 0, n = points.size(); i < n; ++i) {
-      const ScenePoint point = points[i];
+    const std::vector<ScenePoint> originals = points;
+    for (const ScenePoint& point : originals) {
       Eigen::Vector2d pixel;
       EXPECT_TRUE(camera().project(T_camera_world * point.position_w, &pixel));
       const double u_px = pixel.x() < 320 ? 340 + 0.4 * pixel.x() : 120 + 0.4 * (pixel.x() - 320);

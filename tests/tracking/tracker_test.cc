@@ -39,7 +39,7 @@ class TrackerTest : public testing::Test {
     return tracker.track(*shown.frame);
   }
   TrackOutcome track_and_accept(int n) {
-    const TrackOutcome out = track(n);
+    TrackOutcome out = track(n);
     EXPECT_TRUE(out.ok) << n;
     tracker.accept(*shown.frame, out);
     return out;
@@ -358,6 +358,7 @@ TEST_F(TrackerTest, AllocatesNothing) {
   std::vector<SceneFrame> frames;
   for (int n = 1; n <= 6; ++n) frames.push_back(scene.look(drive(n), n * kFrame_us));
   std::vector<std::shared_ptr<const LocalView>> views;
+  views.reserve(6);
   for (int n = 0; n < 6; ++n) views.push_back(scene.view());
   std::vector<Sighting> sightings;
   std::vector<SightingCount> counts;
