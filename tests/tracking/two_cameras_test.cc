@@ -88,6 +88,24 @@ TEST_F(TwoCameraTracking, ALandmarkIsMatchedOnceByEachCamera) {
   EXPECT_GT(by_both, 100);
 }
 
+TEST_F(TwoCameraTracking, AMatchInOneCameraLeavesTheLandmarkFreeInTheOther) {
+  SceneFrame shown = scene.look(scene.T_world_reference, kFrame_us);
+  const std::vector<int> in_first = shown.feature_of_point;
+  scene.show(scene.T_world_reference, 1, &shown);
+  std::uint32_t point = 0;
+  while (in_first[point] < 0 || shown.feature_of_point[point] < 0) ++point;
+  Matcher matcher(scene.config, 2);
+  matcher.set_view(scene.view());
+  matcher.begin(*shown.frame);
+  matcher.add(*shown.frame, point, 0, in_first[point]);
+  matcher.project(*shown.frame, scene.T_world_reference, LandmarkSubset::kAll);
+  matcher.match(*shown.frame, 10.0, 0.9F);
+  std::vector<int> cameras;
+  for (const Match& m : matcher.matches())
+    if (m.view_index == point) cameras.push_back(m.camera);
+  EXPECT_EQ(cameras, (std::vector{0, 1}));
+}
+
 TEST_F(TwoCameraTracking, SightingsNameTheirCamera) {
   start();
   const SceneFrame shown = look_with_both(1);
