@@ -53,7 +53,7 @@ class FrameIntake {
   [[nodiscard]] bool takes(const CameraImage& image) const;
   // Notes the time of a frame. False where it is not after the last frame's.
   [[nodiscard]] bool advance(std::int64_t utime);
-  [[nodiscard]] bool fill_view(const CameraImage& image, int most_features, Frame* frame);
+  [[nodiscard]] bool fill_view(const CameraImage& input, int most_features, Frame* frame);
   template <typename Input>
   [[nodiscard]] std::shared_ptr<Frame> take_frame(const Input& input);
 

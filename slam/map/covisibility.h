@@ -22,10 +22,10 @@ class Covisibility {
 
   // Counts the landmarks of state weak and full that this keyframe shares with each other keyframe. Renews
   // its list and its entry in every other list.
-  void update(KeyframeHandle keyframe);
+  void update(KeyframeHandle handle);
   // Erases the keyframe from every other list. Call before its slot is released. An erased entry is not
   // replaced until the next update() of the list's owner.
-  void leave(KeyframeHandle keyframe);
+  void leave(KeyframeHandle handle);
 
   // Shows translation: two sightings are at least options.wide_parallax_rad apart.
   [[nodiscard]] bool is_wide(const Landmark& landmark) const {
@@ -41,7 +41,7 @@ class Covisibility {
   struct Shared {
     int all = 0, wide = 0;
   };
-  void count_shared(KeyframeHandle keyframe);
+  void count_shared(KeyframeHandle handle);
   void count_observers(const Landmark& landmark);
   // Order of a list: most wide landmarks, then most landmarks, then newest.
   [[nodiscard]] bool stronger(const Covisible& a, const Covisible& b) const;

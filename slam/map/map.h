@@ -81,7 +81,7 @@ class Map {
   // Homogeneous world point (x, y, z, rho): the point is xyz / rho, also where rho is 0.
   [[nodiscard]] Eigen::Vector4d world_point(const Landmark& landmark) const;
   [[nodiscard]] SE3 T_world_anchor(const Landmark& landmark) const;
-  [[nodiscard]] SE3 T_world_camera(const Keyframe& keyframe, int camera) const;
+  [[nodiscard]] SE3 T_world_camera(const Keyframe& keyframe, int index) const;
   // Angle between the anchor's ray and the observation's, by their bearings and poses, rad.
   [[nodiscard]] double parallax(const Landmark& landmark, const Observation& observation) const;
 

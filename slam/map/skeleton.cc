@@ -24,11 +24,6 @@ void Skeleton::remove_without_parent(std::uint64_t id) {
   if (Node* node = find(id)) node->alive = {};
 }
 
-const Skeleton::Node* Skeleton::find(std::uint64_t id) const {
-  const std::uint64_t at = id - first_id_;  // wraps to a huge number for a dropped node
-  return at < nodes_.size() ? &nodes_[at] : nullptr;
-}
-
 bool Skeleton::pose_of(std::uint64_t id, const Pool<Keyframe>& keyframes, SE3* T_world_body) const {
   SE3 tail;
   while (const Node* node = find(id)) {

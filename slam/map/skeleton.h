@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <deque>
 #include <memory_resource>
-#include <utility>
 
 #include "slam/map/growing_memory.h"
 #include "slam/map/keyframe.h"
@@ -40,8 +39,14 @@ class Skeleton {
     Eigen::Vector3d t_parent_this;
   };
   // Null where the node was dropped or never added.
-  [[nodiscard]] const Node* find(std::uint64_t id) const;
-  [[nodiscard]] Node* find(std::uint64_t id) { return const_cast<Node*>(std::as_const(*this).find(id)); }
+  [[nodiscard]] const Node* find(std::uint64_t id) const {
+    return contains(id) ? &nodes_[id - first_id_] : nullptr;
+  }
+  [[nodiscard]] Node* find(std::uint64_t id) { return contains(id) ? &nodes_[id - first_id_] : nullptr; }
+  // False where the node was dropped or never added.
+  [[nodiscard]] bool contains(std::uint64_t id) const {
+    return id - first_id_ < nodes_.size();  // wraps to a huge number for a dropped node
+  }
 
   std::size_t nodes_kept_;
   GrowingMemory memory_;

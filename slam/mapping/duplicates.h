@@ -19,7 +19,7 @@ class Duplicates {
   // Searches the neighbours' landmarks in the keyframe.
   void search_neighbours_landmarks(KeyframeHandle keyframe);
   // The same, after searching the keyframe's landmarks in each neighbour.
-  void fuse_neighbourhood(KeyframeHandle keyframe);
+  void fuse_neighbourhood(KeyframeHandle handle);
 
   // Adds a sighting where a landmark's patch is found on a free corner. A taken corner fuses both landmarks:
   // the one with more sightings stays, and a virtual point is removed. Skips thinned keyframes.

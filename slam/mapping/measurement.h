@@ -13,7 +13,7 @@ namespace farpoint::slam {
 // Aligns the landmark's patch with the image of one camera of the keyframe, from corner `feature`. False
 // where that view has no pixels or the patch is not there; *out is then undefined.
 [[nodiscard]] bool measure_observation(const EstimatorConfig& config, const Map& map,
-                                       const Landmark& landmark, KeyframeHandle keyframe, int camera,
+                                       const Landmark& landmark, KeyframeHandle handle, int camera,
                                        std::size_t feature, Observation* out);
 
 // What predict() needs of a landmark.

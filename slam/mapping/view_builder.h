@@ -43,7 +43,7 @@ class ViewBuilder {
   void add_landmarks_of(const KeyframeView& keyframe_view, bool is_reference, LocalView* view);
   [[nodiscard]] ViewLandmark make_landmark(LandmarkHandle handle, const Landmark& landmark);
   // Distance and nearness of a landmark that the reference sees.
-  void measure_in_reference(ViewLandmark* landmark, LocalView* view);
+  void measure_in_reference(ViewLandmark* v, LocalView* view);
   [[nodiscard]] bool guides_tracking(const Landmark& landmark) const;
   [[nodiscard]] double median_depth();
 

@@ -130,7 +130,7 @@ std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& fram
   return pair;
 }
 
-std::optional<InitialPair> Initialiser::add(std::shared_ptr<Frame> frame) {
+std::optional<InitialPair> Initialiser::add(const std::shared_ptr<Frame>& frame) {
   remember(frame);
   if (!reference_) {
     set_reference(frame);

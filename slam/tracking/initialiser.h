@@ -20,7 +20,7 @@ class Initialiser {
   Initialiser(const EstimatorConfig& config, const Rig& rig, int camera = 0);
 
   // A pair once there is one. The frame joins the history either way.
-  std::optional<InitialPair> add(std::shared_ptr<Frame> frame);
+  std::optional<InitialPair> add(const std::shared_ptr<Frame>& frame);
   // The frame joins the history, and nothing is searched: a pair is being made into a map.
   void remember(std::shared_ptr<Frame> frame);
   void clear();

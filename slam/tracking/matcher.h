@@ -94,7 +94,7 @@ class Matcher {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  void project_into(int camera, const SE3& T_world_body, LandmarkSubset subset);
+  void project_into(int index, const SE3& T_world_body, LandmarkSubset subset);
   [[nodiscard]] Match make_match(const Frame& frame, std::uint32_t view_index, int camera,
                                  std::int32_t feature) const;
   [[nodiscard]] std::uint8_t& taken(int camera, std::int32_t feature) {

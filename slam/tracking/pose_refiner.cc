@@ -16,7 +16,8 @@ constexpr float kLocalRatio = 0.8F;
 
 PoseRefiner::PoseRefiner(const EstimatorConfig& config, Matcher* matcher, int cameras)
     : config_(config.tracking), matcher_(*matcher) {
-  const auto features = static_cast<std::size_t>(cameras * config.extractor.features);
+  const auto features =
+      static_cast<std::size_t>(cameras) * static_cast<std::size_t>(config.extractor.features);
   reserve_touched(&measurements_, features);
   reserve_touched(&motions_px_, features);
 }

@@ -32,7 +32,7 @@ class PoseRefiner {
  private:
   void count_inliers(TrackOutcome* outcome) const;
   [[nodiscard]] double motion_since_reference_px(const SE3& T_world_body);
-  void add_motions_of(int camera, const SE3& T_world_body);
+  void add_motions_of(int index, const SE3& T_world_body);
 
   const TrackingConfig config_;
   Matcher& matcher_;

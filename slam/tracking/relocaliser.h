@@ -42,9 +42,9 @@ class Relocaliser {
   // All in the image of one camera.
   void search_around(const Frame& frame, int camera, const SE3& T_world_body, double radius_px,
                      LandmarkSubset subset);
-  void search_image(const Frame& frame, int camera, LandmarkSubset subset);
+  void search_image(const Frame& frame, int index, LandmarkSubset subset);
   void search_landmark(const FrameView& image, std::uint32_t view_index, const DescriptorQuery& query);
-  TrackOutcome pose_from_correspondences(const Frame& frame, int camera);
+  TrackOutcome pose_from_correspondences(const Frame& frame, int index);
 
   const TrackingConfig config_;
   const int levels_;  // of the pyramid

@@ -19,7 +19,8 @@ Tracker::Tracker(const EstimatorConfig& config, int cameras)
       refiner_(config, &matcher_, cameras),
       relocaliser_(config, &matcher_, &refiner_),
       counter_(static_cast<std::size_t>(config.capacity.landmarks)) {
-  const auto features = static_cast<std::size_t>(cameras * config.extractor.features);
+  const auto features =
+      static_cast<std::size_t>(cameras) * static_cast<std::size_t>(config.extractor.features);
   reserve_touched(&last_seen_, features);
   reserve_touched(&confirmed_seen_, features);
 }
