@@ -209,7 +209,6 @@ void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
 // The pose is published once the next frame has confirmed it.
 void FrontEnd::note_relocalised(const Frame& frame, const TrackOutcome& outcome) {
   if (!is_lost(state_)) ++counts_.lost;
-  odometry_.interrupt();
   state_ = State::kRelocalising;
   tracker_.accept_on_trial(frame, outcome);
   recovery_.set_candidate(relative_to_reference(frame, outcome));
@@ -233,7 +232,6 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
 
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {
   if (!is_lost(state_)) ++counts_.lost;
-  odometry_.interrupt();
   const int keyframes = tracker_.view() != nullptr ? tracker_.view()->map_keyframes : 0;
   const Recovery::Verdict verdict = recovery_.note_lost(frame->utime, settled_, keyframes);
   state_ = recovery_.state();

@@ -10,14 +10,17 @@ namespace farpoint::slam {
 
 class Odometry {
  public:
-  // The body moved to this pose of the map. Adds the motion since the pose before; none after interrupt().
+  // The body moved to this pose of the map. Adds the motion since the pose before, also over frames that were
+  // lost: where the same map has both poses, it tells what happened between them.
   void advance(const SE3& T_map_body);
   // The map moved under the body: both arguments are one pose, before and after the correction. odom stays.
   void correct(const SE3& T_map_body_before, const SE3& T_map_body_after);
-  // Frames were lost: the motion until the next pose is not added.
-  void interrupt() { has_last_ = false; }
-  // A new map has another origin and unit.
-  void begin_map() { ++resets_; }
+  // A new map has another origin and unit. The motion since the last pose of the old one stays unknown, which
+  // the reset counter tells.
+  void begin_map() {
+    ++resets_;
+    has_last_ = false;
+  }
 
   [[nodiscard]] const SE3& T_odom_body() const { return T_odom_body_; }
   // At this pose of the map. The scale is 1: odom has the map's unit.
