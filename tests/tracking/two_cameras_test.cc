@@ -154,7 +154,8 @@ TEST_F(TwoCameraTracking, AMapStartsFromTheImagesOfEitherCamera) {
     }
     ASSERT_TRUE(pair.has_value()) << camera;
     EXPECT_EQ(pair->camera, camera);
-    const double last = static_cast<double>(pair->second->utime / kFrame_us);
+    const std::int64_t frames = pair->second->utime / kFrame_us;
+    const auto last = static_cast<double>(frames);
     EXPECT_LT((so3_log(pair->T_first_second.q) - Eigen::Vector3d(0, 0, 0.01 * last)).norm(), 1e-3) << camera;
   }
 }
