@@ -17,13 +17,6 @@ slam::CameraModel read_model(const YamlFile& yaml) {
             "expected model 'pinhole-radtan' or 'kannala-brandt', found '" + model + "'");
 }
 
-// A camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
-slam::SE3 forward_looking() {
-  Eigen::Matrix3d R_body_camera;
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(R_body_camera).normalized(), Eigen::Vector3d::Zero()};
-}
-
 CameraFile read_camera(const YamlFile& yaml) {
   yaml.allow_only({"model", "width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
                    "T_body_camera", "rate_hz", "row_time_s"});
@@ -70,7 +63,8 @@ calibration_t calibration_of(const CameraFile& camera, const std::string& name) 
   calibration_t message{};
   message.body_name = camera.T_body_camera ? "body" : "";
   message.ncameras = 1;
-  message.cameras = {camera_message(name, camera.parameters, camera.T_body_camera.value_or(forward_looking()),
+  const slam::SE3 forward{slam::q_body_forward_camera(), Eigen::Vector3d::Zero()};
+  message.cameras = {camera_message(name, camera.parameters, camera.T_body_camera.value_or(forward),
                                     camera.rate_hz, camera.row_time_s)};
   message.imu_orientation[0] = 1.0;
   return message;

@@ -17,6 +17,13 @@ struct RigCamera {
   SE3 T_body_camera;
 };
 
+// Rotation of an upright camera that looks along the body's x axis (body axes: x forward, y left, z up).
+[[nodiscard]] inline Eigen::Quaterniond q_body_forward_camera() {
+  Eigen::Matrix3d R_body_camera;
+  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return Eigen::Quaterniond(R_body_camera);
+}
+
 // All cameras of one body.
 struct Rig {
   std::vector<RigCamera> cameras;

@@ -29,10 +29,7 @@ constexpr double kStep_m = 0.8;
 // Two equal cameras side by side, looking along the body's x axis, 1.5 m before the body's origin.
 Rig stereo_rig() {
   Rig rig = two_camera_rig();
-  Eigen::Matrix3d R_body_camera;
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  const Eigen::Quaterniond q(R_body_camera);
-  rig.cameras[0].T_body_camera = {q, {1.5, 0.5 * kBaseline_m, 1.2}};
+  rig.cameras[0].T_body_camera = {q_body_forward_camera(), {1.5, 0.5 * kBaseline_m, 1.2}};
   rig.cameras[1] = rig.cameras[0];
   rig.cameras[1].T_body_camera.t.y() -= kBaseline_m;
   return rig;

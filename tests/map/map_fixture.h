@@ -32,10 +32,8 @@ inline Rig two_camera_rig() {
   p.width_px = 640, p.height_px = 480;
   p.fx_px = 420, p.fy_px = 425, p.cx_px = 322, p.cy_px = 239;
   p.distortion = {-0.2, 0.05, 0.0003, -0.0002, 0.0};
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // body x forward, y left, z up
   Rig rig;
-  rig.cameras.push_back({"front", Camera(p), {Eigen::Quaterniond(R), {0.2, 0.0, 0.1}}});
+  rig.cameras.push_back({"front", Camera(p), {q_body_forward_camera(), {0.2, 0.0, 0.1}}});
   p.model = CameraModel::kKannalaBrandt;
   p.distortion = {0.01, -0.004, 0.001, 0.0, 0.0};
   rig.cameras.push_back(

@@ -30,10 +30,8 @@ slam::Camera::Parameters drone_camera() {
 
 // Camera axes (x right, y down, z forward) on body axes (x forward, y left, z up), pitched down.
 SE3 forward_camera(double pitch_down_rad) {
-  Eigen::Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   SE3 T;
-  T.q = (slam::so3_exp({0.0, pitch_down_rad, 0.0}) * Eigen::Quaterniond(R)).normalized();
+  T.q = (slam::so3_exp({0.0, pitch_down_rad, 0.0}) * slam::q_body_forward_camera()).normalized();
   return T;
 }
 

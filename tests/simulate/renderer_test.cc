@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "slam/geometry/rig.h"
 #include "tools/simulate/render/renderer.h"
 #include "tools/simulate/render/span_kernels.h"
 #include "tools/simulate/sensors/camera_sensor.h"
@@ -53,9 +54,7 @@ class WallScene : public testing::Test {
 
   // Looks along world x.
   static slam::SE3 forward(const Eigen::Vector3d& position) {
-    Eigen::Matrix3d R;
-    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    return {Eigen::Quaterniond(R), position};
+    return {slam::q_body_forward_camera(), position};
   }
   static slam::Camera camera(slam::CameraModel model, const std::array<double, 5>& distortion) {
     slam::Camera::Parameters p;

@@ -60,10 +60,7 @@ class BundleScene {
     p.width_px = 752, p.height_px = 480;
     p.fx_px = 458, p.fy_px = 457, p.cx_px = 367, p.cy_px = 248;
     p.distortion = {-0.28, 0.07, 0.0002, 0.00002, 0.0};
-    // Body x forward, y left, z up; camera z forward, x right.
-    Eigen::Matrix3d R;
-    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    rig.cameras.push_back({"front", Camera(p), {Eigen::Quaterniond(R), {0.3, 0.1, 0.2}}});
+    rig.cameras.push_back({"front", Camera(p), {q_body_forward_camera(), {0.3, 0.1, 0.2}}});
     for (int i = 1; i < options_.cameras; ++i) {
       p.model = CameraModel::kKannalaBrandt;
       p.fx_px = 300, p.fy_px = 301;

@@ -78,9 +78,7 @@ class PointWorld {
     slam::Camera::Parameters p;
     p.width_px = 640, p.height_px = 480;
     p.fx_px = p.fy_px = 400, p.cx_px = 320, p.cy_px = 240;
-    Eigen::Matrix3d R;
-    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // body x forward, y left, z up
-    rig_.cameras.push_back({"front", slam::Camera(p), {Eigen::Quaterniond(R), {0.2, -0.1, 0.3}}});
+    rig_.cameras.push_back({"front", slam::Camera(p), {slam::q_body_forward_camera(), {0.2, -0.1, 0.3}}});
     std::mt19937_64 engine(7);
     const auto uniform = [&engine](double low, double high) {
       return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53;

@@ -20,6 +20,13 @@
 
 namespace farpoint::slam::test {
 
+inline constexpr std::int64_t kFrame_us = 100'000;  // between two frames
+
+// Length of the perturbation (metres and radians) from the truth to a pose.
+inline double error_of(const SE3& T, const SE3& truth) {
+  return truth.boxminus_to(T).norm();
+}
+
 // What a test changes about one point.
 struct ScenePoint {
   Eigen::Vector3d position_w = Eigen::Vector3d::Zero();
@@ -84,9 +91,7 @@ class TrackingScene {
     Camera::Parameters p;
     p.width_px = 640, p.height_px = 480;
     p.fx_px = 420, p.fy_px = 400, p.cx_px = 330, p.cy_px = 225;
-    Eigen::Matrix3d R_body_camera;
-    R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    rig.cameras.push_back({"front", Camera(p), {Eigen::Quaterniond(R_body_camera), {0.4, 0.15, 0.25}}});
+    rig.cameras.push_back({"front", Camera(p), {q_body_forward_camera(), {0.4, 0.15, 0.25}}});
     for (int i = 0; i < points; ++i) this->points.push_back(random_point(points - i));
   }
 

@@ -13,14 +13,10 @@
 namespace farpoint::slam {
 namespace {
 
+using test::error_of;
+using test::kFrame_us;
 using test::SceneFrame;
 using test::TrackingScene;
-
-constexpr std::int64_t kFrame_us = 100'000;
-
-double error_of(const SE3& T, const SE3& truth) {
-  return truth.boxminus_to(T).norm();
-}
 
 // The second camera looks 0.2 rad further to the left, through another lens.
 class TwoCameraTracking : public testing::Test {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "ipc/image_codec.h"
+#include "slam/geometry/rig.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 #include "tools/evaluate/statistics.h"
@@ -39,9 +40,7 @@ ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem:
 }
 
 slam::SE3 forward_looking_T_body_camera() {
-  Eigen::Matrix3d R_body_camera;
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(R_body_camera).normalized(), Eigen::Vector3d::Zero()};
+  return {slam::q_body_forward_camera(), Eigen::Vector3d::Zero()};
 }
 
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "slam/geometry/rig.h"
 #include "tools/common/errors.h"
 #include "tools/simulate/world/yaml_section.h"
 
@@ -175,11 +176,9 @@ void read_flight(YamlSection s, FlightDescription* d) {
 
 // Looking direction of a camera on the body: forward, then turned to the left by yaw and down by pitch.
 slam::SE3 mounted(const Eigen::Vector3d& position, double yaw_rad, double pitch_down_rad) {
-  Eigen::Matrix3d R_forward;
-  R_forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(pitch_down_rad, Eigen::Vector3d::UnitY()));
-  return {(turn * Eigen::Quaterniond(R_forward)).normalized(), position};
+  return {(turn * slam::q_body_forward_camera()).normalized(), position};
 }
 
 Eigen::Vector3d read_position(YamlSection* s, const std::string& key) {
