@@ -10,13 +10,13 @@ namespace farpoint::slam {
 
 class Odometry {
  public:
-  // The body moved to this pose of the map. Adds the motion since the pose before, also over frames that were
-  // lost: where the same map has both poses, it tells what happened between them.
+  // The body moved to this pose of the map. Adds the motion since the pose before, across lost frames too:
+  // both poses are of the same map.
   void advance(const SE3& T_map_body);
   // The map moved under the body: both arguments are one pose, before and after the correction. odom stays.
   void correct(const SE3& T_map_body_before, const SE3& T_map_body_after);
-  // A new map has another origin and unit. The motion since the last pose of the old one stays unknown, which
-  // the reset counter tells.
+  // A new map has another origin and unit. The reset counter rises, since the motion from the old map's last
+  // pose to the first of the new one is unknown.
   void begin_map() {
     ++resets_;
     has_last_ = false;

@@ -13,7 +13,7 @@
 
 namespace farpoint::slam {
 
-// The newest samples, ascending in time. The oldest gives way to the newest.
+// The newest samples, ascending in time. A full history overwrites its oldest sample.
 template <typename Sample>
 class SampleHistory {
  public:

@@ -69,7 +69,7 @@ struct ScaleConfig {
   double assumed = 0.0;  // metres a map unit; 0: unknown
 };
 
-// What a later start is to find.
+// State kept over restarts.
 struct StateConfig {
   std::string folder = "auto";  // auto: the service's, none where there is none
 };

@@ -13,8 +13,8 @@ class MeasurementFeed {
   // The estimator outlives this.
   explicit MeasurementFeed(slam::Estimator* estimator) : estimator_(*estimator) {}
 
-  // One thread a sensor; makes no heap call. The estimator counts what comes late or finds no room. Finite
-  // messages only (drivers::LogSource): an unknown value of WHEELS is the exception, it weighs nothing.
+  // One thread a sensor; makes no heap call. The estimator counts late samples and those that find its queue
+  // full. Values are finite (drivers::LogSource) except unknown ones of WHEELS, which get an infinite sigma.
   void add(const imu_t& message);
   void add(const wheels_t& message);
 

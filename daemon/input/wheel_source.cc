@@ -10,7 +10,7 @@
 namespace farpoint::daemon {
 namespace {
 
-// Room for as many wheels as there can be, so that no measurement uses the heap.
+// A message sized for the most wheels, so that no measurement uses the heap.
 wheels_t with_room() {
   constexpr std::size_t kMostWheels = 4;
   wheels_t message{};

@@ -1,8 +1,8 @@
 // Odometry on the bus, by the steady clock: an epoch at the configured rate, whatever happens to images.
 //
-// At most one epoch is in flight. Its status frame goes out first; the others follow when the controller has
-// confirmed it. Where the bus takes nothing, epochs are left out and counted, so that only the frame that was
-// in flight can come out late. The DBC tells receivers to reject what does not follow its status frame.
+// At most one epoch is in flight. Its status frame is sent first; the others follow once the controller has
+// confirmed it. A blocked bus drops whole epochs, which are counted, so that only the frame in flight can be
+// late. Receivers reject frames that do not follow their status frame (DBC).
 #pragma once
 
 #include <limits>
@@ -21,14 +21,14 @@ class CanBus final : public PoseSink {
   static constexpr double kNever_s = std::numeric_limits<double>::infinity();
 
   CanBus(const ipc::CanLayout& layout, const EpochOptions& options);
-  // Says farewell where the caller has not.
+  // Sends the farewell if the caller has not.
   ~CanBus() override;
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
 
   // Before the first tick. Without a bus the epochs go into the log alone.
   void send_on(std::unique_ptr<drivers::SocketCan> bus) { bus_ = std::move(bus); }
-  // The log gets what the controller confirmed, with the time at which it did.
+  // The log holds confirmed frames only, each with the time of its confirmation.
   void log_to(std::unique_ptr<ipc::CandumpWriter> log) { log_ = std::move(log); }
   void set_body_is_camera(bool is_camera) { predictor_.set_body_is_camera(is_camera); }
 
@@ -36,14 +36,14 @@ class CanBus final : public PoseSink {
   void on_frame(const FrameOutput& frame) override;
   // Sends what is due, takes confirmations, and looks for a bus that is away.
   void tick(double now_s);
-  // When tick() has to be called next; the steady clock.
+  // Time of the next call of tick(); seconds of the steady clock.
   [[nodiscard]] double next_due_s() const;
 
-  // Calling thread: moves what was confirmed into the log.
+  // Calling thread: writes the confirmed frames to the log.
   void write_log();
   // Calling thread, after the output thread has ended: sends the last epoch. Waits up to 0.3 s for the bus.
   void farewell();
-  // Puts the log in its place. Throws std::runtime_error where something was not stored.
+  // Renames the log to its final name. Throws std::runtime_error if a write failed.
   void close();
 
   // Frames that did not reach the bus.
@@ -58,7 +58,7 @@ class CanBus final : public PoseSink {
     std::int64_t utime = 0;
     ipc::CanFrame frame;
   };
-  static constexpr std::size_t kLogged = 4096;  // frames that the log may be behind, nine seconds
+  static constexpr std::size_t kLogged = 4096;  // confirmed frames waiting for the log: nine seconds
 
   void maintain(double now_s);
   void take_confirmations(double now_s);

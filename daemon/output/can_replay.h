@@ -1,4 +1,4 @@
-// Odometry of a replay, by the recording's clock: the same epochs as on the vehicle, and the same again.
+// Epochs of a replay, timed by the recording's clock. A repeated replay sends the same bytes.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@
 
 namespace farpoint::daemon {
 
-// Epochs are a period apart, from when the first frame was there. A frame counts from its time plus its age:
-// the epochs before rest on the one before it.
+// The first epoch is due with the first frame, the others a period apart. An epoch uses the newest frame
+// whose time plus age has passed.
 class CanReplay final : public PoseSink {
  public:
   CanReplay(const ipc::CanLayout& layout, const EpochOptions& options)
@@ -22,8 +22,8 @@ class CanReplay final : public PoseSink {
   void set_body_is_camera(bool is_camera) { predictor_.set_body_is_camera(is_camera); }
 
   void on_frame(const FrameOutput& frame) override;
-  // Sends the epoch after the last frame, and the farewell. Puts the log in its place. Throws
-  // std::runtime_error where something was not stored.
+  // Sends the epoch after the last frame and the farewell, and renames the log to its final name. Throws
+  // std::runtime_error if a write failed.
   void close();
 
   // Frames that the bus did not take, and frames of the camera that the log cannot hold (a time before 1970).

@@ -1,4 +1,4 @@
-// What is true at a moment of sending: the last frame's outcome, predicted to that moment.
+// Predicts the last frame's outcome to the time of sending.
 #pragma once
 
 #include <array>
@@ -19,12 +19,13 @@ struct EpochOptions {
 // Times are in microseconds of one clock: the steady clock live, the recording's in replay.
 class EpochPredictor {
  public:
-  // A pose that is older by its image is not valid: no sensor has measured the motion since.
+  // Greatest age of the image of a valid pose. No sensor has measured the motion since.
   static constexpr std::int64_t kLongest_us = 250'000;
 
   explicit EpochPredictor(const EpochOptions& options) : options_(options) {}
 
-  // A frame of the image taken at image_us. A frame of state no_camera has no image: the age goes on.
+  // Takes the outcome of the image at image_us. The state no_camera brings no image, so the age keeps
+  // growing.
   void take(const FrameOutput& frame, std::int64_t image_us);
   void set_body_is_camera(bool is_camera) {
     body_is_camera_ = is_camera ? ipc::CanYesNo::kYes : ipc::CanYesNo::kNo;
