@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -252,6 +253,21 @@ TEST(CanLayout, TheDefaultTakesUnder8PercentOf500Kbit) {
   const double load = CanLayout{}.worst_load(500e3);
   EXPECT_NEAR(load, (5 * 50 + 4 * 10) * 135 / 500e3, 1e-12);
   EXPECT_LT(load, 0.08);
+}
+
+// The manual's table: a row holds the identifier and the name of each frame.
+TEST(Dbc, TheManualHasEveryFrameWithItsIdentifier) {
+  std::ifstream manual(test::source_dir() + "/ipc/README.md");
+  std::vector<std::string> rows;
+  for (std::string line; std::getline(manual, line);) rows.push_back(line);
+  for (const auto& [id, message] : dbc()) {
+    std::ostringstream identifier;
+    identifier << "0x" << std::hex << id;
+    const auto is_row = [&](const std::string& row) {
+      return row.find(identifier.str()) != std::string::npos && row.find(message.name) != std::string::npos;
+    };
+    EXPECT_EQ(std::count_if(rows.begin(), rows.end(), is_row), 1) << identifier.str() << " " << message.name;
+  }
 }
 
 TEST(Dbc, SignalsDoNotOverlapAndStayWithinTheFrame) {
