@@ -7,9 +7,7 @@ namespace farpoint::daemon {
 using Side = drivers::StereoPairing::Side;
 
 StereoWatch::StereoWatch(SecondCamera* second, std::int64_t tolerance_us)
-    : second_(*second), pairing_({tolerance_us, kPatience_us}) {
-  pairing_.set_away(Side::kRight, true);
-}
+    : second_(*second), pairing_({tolerance_us, kPatience_us}) {}
 
 void StereoWatch::note(std::optional<std::int64_t> utime, std::int64_t now_us) {
   while (second_.take_news(&last_)) {

@@ -261,12 +261,12 @@ TEST(Dbc, TheManualHasEveryFrameWithItsIdentifier) {
   std::vector<std::string> rows;
   for (std::string line; std::getline(manual, line);) rows.push_back(line);
   for (const auto& [id, message] : dbc()) {
-    std::ostringstream identifier;
-    identifier << "0x" << std::hex << id;
-    const auto is_row = [&](const std::string& row) {
-      return row.find(identifier.str()) != std::string::npos && row.find(message.name) != std::string::npos;
+    std::ostringstream hex;
+    hex << "0x" << std::hex << id;
+    const auto is_row = [identifier = hex.str(), name = message.name](const std::string& row) {
+      return row.find(identifier) != std::string::npos && row.find(name) != std::string::npos;
     };
-    EXPECT_EQ(std::count_if(rows.begin(), rows.end(), is_row), 1) << identifier.str() << " " << message.name;
+    EXPECT_EQ(std::count_if(rows.begin(), rows.end(), is_row), 1) << hex.str() << " " << message.name;
   }
 }
 

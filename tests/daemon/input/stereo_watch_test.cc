@@ -97,20 +97,37 @@ TEST_F(StereoWatchTest, ImagesFurtherApartAreAlone) {
 }
 
 TEST_F(StereoWatchTest, WhileTheSecondCameraIsAwayEachImageIsAloneAtOnce) {
-  left(0);  // it has not come yet
-  EXPECT_EQ(counts().stereo_left_alone, 1);
+  right(0);
+  left(0);
+  EXPECT_EQ(counts().stereo_pairs, 1);
   right(kPeriod_us);
   left(kPeriod_us);
-  EXPECT_EQ(counts().stereo_pairs, 1);
+  EXPECT_EQ(counts().stereo_pairs, 2);
   right_camera_->streaming = false;
   right(std::nullopt);
   left(2 * kPeriod_us);
-  EXPECT_EQ(counts().stereo_left_alone, 2);
+  EXPECT_EQ(counts().stereo_left_alone, 1);
   right_camera_->streaming = true;
   right(3 * kPeriod_us);
   left(3 * kPeriod_us);
-  EXPECT_EQ(counts().stereo_pairs, 2);
+  EXPECT_EQ(counts().stereo_pairs, 3);
   EXPECT_EQ(counts().stereo_right_alone, 0);
+}
+
+TEST_F(StereoWatchTest, BeforeTheSecondCameraCameAnImageKeepsItsPlaceForAPartner) {
+  left(0);
+  EXPECT_EQ(counts().stereo_left_alone, 0);
+  right(0);
+  left(kPeriod_us);
+  EXPECT_EQ(counts().stereo_pairs, 1);
+  EXPECT_EQ(counts().stereo_right_alone, 0);
+}
+
+TEST_F(StereoWatchTest, WithoutASecondCameraEachImageIsCountedAsAloneWithin200Milliseconds) {
+  for (int i = 0; i < 20; ++i) left(i * kPeriod_us);
+  const std::int64_t due = kPatience_us / kPeriod_us;
+  EXPECT_GE(counts().stereo_left_alone, 20 - due - 1);
+  EXPECT_LT(counts().stereo_left_alone, 20);
 }
 
 TEST_F(StereoWatchTest, TheLastImageBeforeItWentStillFindsItsPartner) {
