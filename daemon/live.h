@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daemon on the vehicle: a camera in, until it is told to stop.
 #pragma once
 

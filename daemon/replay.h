@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Replay of a recorded log: in lockstep, with threads at a pace, or as a threaded run was recorded.
 #pragma once
 

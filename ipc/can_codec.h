@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Odometry as CAN frames of layout 2 (ipc/can_layout.h). config/farpoint.dbc describes the same to the
 // receiver; tests hold both together.
 #pragma once

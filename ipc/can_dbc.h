@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The DBC file of a layout: what a receiver needs to read the odometry.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One CAN frame, apart from linux/can.h so that codec and logs build anywhere.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Layout 2 of the odometry on the bus: messages, signals, identifiers, cycles. The encoder and the DBC writer
 // read the same table, so that both always agree.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // CAN logs in the format of `candump -L`: "(seconds.micros) interface ID#HEXDATA", CAN FD frames with
 // "ID##1HEXDATA". An identifier has 3 digits, one of 29 bits has 8.
 #pragma once

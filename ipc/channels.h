@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Names of the LCM channels (DESIGN.md, "What goes out").
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Signals of a DBC file, by the names of message and signal: reads a value from a CAN frame and writes one
 // into it.
 #pragma once

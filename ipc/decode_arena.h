@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory for the image libraries, which allocate and free for every image. Blocks are kept from image to
 // image.
 #pragma once

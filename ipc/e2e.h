@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // AUTOSAR E2E profile 1 for classic CAN frames (AUTOSAR "Specification of SW-C End-to-End Communication
 // Protection Library", profile 1, variant 1A).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Decodes image bytes to 8-bit grey. Damaged bytes neither throw nor crash; only lack of memory throws.
 #pragma once
 

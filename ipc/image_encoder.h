@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 8-bit grey images to JPEG and PNG files, in memory. For tools and tests: takes memory from the heap.
 #pragma once
 

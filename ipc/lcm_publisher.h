@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Publishes LCM messages to the network without a heap call.
 //
 // LCM's C++ publish() allocates a buffer for each message. This class encodes into one fixed buffer and calls

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads LCM logs through damage, and writes them whole or not at all.
 //
 // Event format (LCM's, big-endian): sync word 0xEDA1DA01, event number (8 bytes), receive time in us (8),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # From the LCM types to a jar of their Java classes. FOLDER is emptied, so that types that are gone leave no class.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Decodes and encodes LCM messages.
 //
 // lcm-gen's decoders trust counts and string lengths: a damaged one makes them allocate gigabytes or read

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Atomic output files: written under a temporary name beside the target, renamed at the end.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mapping's half of the estimator: takes jobs, works on the map, makes replies. The thread that calls step()
 // is the only writer of the map.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the module lib/farpoint/farpoint_ceres.so exports. Module and program must be of one build.
 #pragma once
 

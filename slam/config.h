@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every parameter of the estimator: plain values, with units. The daemon fills them from farpoint.yaml; the
 // defaults here equal the shipped file. Nothing here may be fitted to one camera or recording.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The facade of the estimator: measurements in, poses out. No I/O, no threads, no clock, no logging, no
 // globals.
 //

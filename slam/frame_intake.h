@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From an image to a frame with features: checks, numbers and extracts. Frames and pyramids come from fixed
 // pools; no heap call after construction.
 #pragma once

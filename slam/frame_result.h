@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Input and result of the estimator for one frame.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tracking's half of the estimator: frames in, poses out, jobs for mapping. Never waits. Makes no heap call
 // once a map has settled; two-view geometry before the first map may.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What reports, pictures and statistics read of the maps. Reads only, and copies what it gives.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tracking's end of the rings to mapping: which jobs are sent, which replies are due. Never waits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Jobs from tracking to mapping, replies back, and the fixed rings between them. Neither side waits.
 //
 // Tracking sends jobs and, one a posed frame, that frame's pose. Mapping answers every job with one or two

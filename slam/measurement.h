@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measurements that enter the estimator, one struct a sensor. SI units. Times are microseconds in the one
 // clock of the frames.
 #pragma once

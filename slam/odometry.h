@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The frame `odom`: continuous, because it integrates relative motion only. Corrections of the map go into
 // map_from_odom, a new origin or unit raises the reset counter.
 #pragma once

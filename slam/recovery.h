@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back after lost frames: when a frame is searched for instead of tracked, when a place found again
 // is trusted, when the map is given up.
 //

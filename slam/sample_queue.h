@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples of one sensor on their way from the caller's thread to tracking, and the newest ones kept for
 // fusion. All memory is allocated at the start; neither thread waits.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A fixed ring between two threads: one pushes, one pops, neither waits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stages of a frame's way, announced to whoever wants to measure them. The estimator has no clock: a
 // listener outside notes the time.
 #pragma once

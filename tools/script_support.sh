@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Read by tools/test and tools/demo: stops at the first error, and always ends with one clear line.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

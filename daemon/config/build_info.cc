@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/config/build_info.h"
 
 #include "farpoint_build.h"  // made at build time: FARPOINT_VERSION, FARPOINT_COMMIT, FARPOINT_BUILD_TYPE

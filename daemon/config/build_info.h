@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Identity of this program: version, commit, compiler.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Geometry to calibration messages. rig.h converts the other way.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/config/camera_file.h"
 
 #include "daemon/config/calibration_message.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Camera files (config/cameras/*.yaml): one calibrated camera, every key explained in
 // config/cameras/README.md.
 #pragma once

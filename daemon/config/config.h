@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daemon's configuration: farpoint.yaml and --set, checked key by key.
 //
 // One table (config_keys()) holds every key: name, type, unit, range, and the field it fills. Parsing,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The table of all configuration keys. Ranges are wide on purpose: they stop typing errors and what cannot
 // work, not experiments.
 #include <charconv>

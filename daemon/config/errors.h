@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Input that cannot be used.
 #pragma once
 

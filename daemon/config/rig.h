@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts a calibration message to the estimator's rig.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Run at every build: writes HEADER with the commit of SOURCE_DIR, and touches it only where it changed.
 find_program(GIT git)
 set(commit "no-commit")

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Strict YAML files: every error names file and line.
 #pragma once
 

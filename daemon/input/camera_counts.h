@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts one live camera's counts to InputCounts.
 #pragma once
 

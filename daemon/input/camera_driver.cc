@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/camera_driver.h"
 
 #include "drivers/camera/live_camera.h"

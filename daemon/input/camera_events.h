@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes a live camera's events from its capture thread to the thread that logs them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A live camera as the capture thread's source, with an optional recorder and second camera.
 #pragma once
 

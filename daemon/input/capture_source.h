@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Source of the capture thread: a recording at its pace, or a camera.
 #pragma once
 

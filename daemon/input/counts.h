@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Counts since the start: received, refused, not sent.
 #pragma once
 

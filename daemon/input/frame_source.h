@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Source of images: one interface for all recordings.
 #pragma once
 

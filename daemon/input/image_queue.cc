@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/image_queue.h"
 
 namespace farpoint::daemon {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Queue of images from capture to tracking: the newest N, in memory allocated at start.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/measurement_feed.h"
 
 #include <cmath>

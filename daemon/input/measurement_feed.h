@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // IMU and WHEELS messages as the estimator's samples.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Plays a recorded log at a multiple of its pace.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // --record: writes the cameras' images to a log that can be replayed, on a thread of its own (fp-record).
 // When the disk is too slow, images are left out and counted; no thread waits.
 #pragma once

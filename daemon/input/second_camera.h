@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The second camera of a stereo pair, on a capture thread of its own (fp-capture-1). Its images go to the
 // recorder; the first camera's thread receives their times. Neither thread waits for the other.
 #pragma once

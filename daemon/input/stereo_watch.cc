@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/stereo_watch.h"
 
 #include "daemon/input/camera_counts.h"

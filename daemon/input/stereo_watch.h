@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Matches the images of a stereo pair by time, and counts pairs and single images. No image waits for the
 // result, which follows within kPatience_us; at once after the second camera went away. A second camera that
 // has not come yet may still open, so its partners are counted as alone after kPatience_us.

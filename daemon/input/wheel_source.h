@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wheel speeds from the vehicle's bus, on a thread of their own and a socket of their own.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Odometry on the bus, by the steady clock: an epoch at the configured rate, whatever happens to images.
 //
 // At most one epoch is in flight. Its status frame is sent first; the others follow once the controller has

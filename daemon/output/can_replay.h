@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Epochs of a replay, timed by the recording's clock. A repeated replay sends the same bytes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Predicts the last frame's outcome to the time of sending.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A pose predicted to a moment after its image.
 #pragma once
 

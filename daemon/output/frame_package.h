@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tracking hands to the output of one frame: by value, so that nothing of tracking's is read later.
 #pragma once
 

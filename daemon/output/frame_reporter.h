@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Everything that is published of a frame, in one order, on one thread; no heap call after the first frames.
 #pragma once
 

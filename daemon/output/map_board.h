@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // FARPOINT_MAP on its way from mapping, the only thread that may read the map, to the output.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where encoded LCM messages go.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From the estimator's results to the messages of ipc/types. Pure functions: the same input gives the same
 // bytes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Everything that a run writes or sends. Files appear when close() is called, else not at all.
 #pragma once
 

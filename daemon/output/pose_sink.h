@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a frame's outcome goes: one interface, whether it is a network, a bus or a file.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns frames into LCM messages and hands each, encoded once, to every message sink.
 #pragma once
 

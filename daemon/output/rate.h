@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Messages at a rate, by the frames' time.
 #pragma once
 

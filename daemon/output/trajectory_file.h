@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Trajectories as files in TUM format: "seconds tx ty tz qx qy qz qw", T_map_body.
 #pragma once
 

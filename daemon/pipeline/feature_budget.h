@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many features a frame may have: those of the configuration, and fewer while tracking does not keep the
 // camera's pace. Fewer features cost less here and in mapping (a keyframe's cost grows with them), and an
 // older pose is worse for a controller than a slightly noisier one.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The threads of the vehicle, whether images come from a camera or from a recording at its own pace:
 //
 //   capture  -> images, the newest few -> tracking -> packages -> output -> notes -> the calling thread

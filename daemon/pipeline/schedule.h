@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The recorded schedule of a threaded run, to be repeated.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One run of the estimator and everything that is published of it, wherever the images come from.
 //
 // Published times derive from the frames' utime; measured ones go to FARPOINT_TIMING, and in a threaded run

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Counts the starts of the daemon, so that a receiver can tell a restart from none.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Commands to a running daemon on a local socket. File permissions control access, since LCM multicast is not
 // authenticated. One request a connection, one line each way.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daemon's log on standard error: start, end, changes of state, deviations from the configuration. No
 // line for a frame.
 #pragma once

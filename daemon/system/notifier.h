@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wakes one thread by another without a lock: the one place where a thread waits.
 #pragma once
 

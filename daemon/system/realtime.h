@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real-time set-up of a threaded run: locked memory, processor latency, and for each thread name, stack size,
 // core and priority. Refusals are reported in one place and the run continues; with realtime.require it does
 // not start.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The log of a service: to the journal (or standard error) and a rotating file, written on a thread of its
 // own (fp-log). Logging threads never wait; the message rate is limited.
 #pragma once

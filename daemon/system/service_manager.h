@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reports to the service manager (systemd): ready, reloading, stopping, alive. Without one all calls do
 // nothing.
 #pragma once

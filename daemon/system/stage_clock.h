@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measures the stages of one frame, thread CPU and elapsed time. The estimator has no clock, so the daemon
 // measures around it. Measured values go to FARPOINT_TIMING and the last line only.
 #pragma once

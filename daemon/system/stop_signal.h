@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SIGINT and SIGTERM end a run between two frames; results up to then are written.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Chooses exposure and gain by the brightness of the images. Prefers short exposures: noise costs a tracker
 // less than motion blur.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A live camera: one interface for all drivers. The capture thread makes all calls except construction,
 // destruction and set_exposure(). It waits in next() only; next() makes no heap call after the first images
 // and writes no log. A listener receives what an operator needs.

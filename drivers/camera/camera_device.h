@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The driver below a live camera (live_camera.h): one device that is opened, streamed from and closed, any
 // number of times. Capture thread only. Errors are negative errno; *what (static text) names the failed step.
 #pragma once

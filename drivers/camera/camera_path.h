@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the device node of a camera by one of three names:
 //   /dev/video0           a path
 //   by-id:NAME            of /dev/v4l/by-id

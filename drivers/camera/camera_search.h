@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Schedules the search for an absent camera and reports each change of state once. Intervals between tries
 // double up to 1 s. Capture thread; no heap call.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts a driver's time stamp to the image's time: mid-exposure of its middle row, CLOCK_MONOTONIC.
 //
 // Documents do not state reliably which clock a stamp is of. The clock is therefore detected: an image that

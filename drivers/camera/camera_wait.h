@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The one wait of a capture thread and its clocks. Tests replace both.
 #pragma once
 

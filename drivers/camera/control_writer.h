@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sets a camera's controls on a thread of its own (fp-controls). A control call may block for a USB transfer
 // and its answer; the capture thread must not wait for it.
 #pragma once

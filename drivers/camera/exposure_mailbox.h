@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes new exposure options from any thread to the capture thread. The capture thread never waits.
 #pragma once
 

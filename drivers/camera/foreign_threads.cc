@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera/foreign_threads.h"
 
 #include <pthread.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stack and priority of threads that libraries start without attributes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera/frame_intake.h"
 
 #include "drivers/camera/pixel_conversion.h"

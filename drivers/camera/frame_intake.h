@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns a driver's buffer into an image: follows its number, converts its time, copies its pixels to grey,
 // and counts refused frames. Capture thread; no heap call after the first image.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A live camera over any CameraDevice. Opens it, streams from it, and searches it again after a loss or a
 // stall.
 #pragma once

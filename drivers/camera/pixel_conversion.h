@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts pixel layouts of cameras to 8-bit grey in one pass, front to back, since the driver's memory may
 // be uncached. Returns false for too few bytes; the image is then unchanged.
 #pragma once

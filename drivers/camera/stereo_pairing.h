@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Matches the images of two cameras by time. An image without a partner becomes a monocular frame and is
 // counted. Fixed memory, no lock, no clock; all calls come from one thread.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/can/link_info.h"
 
 #include <linux/netlink.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A raw SocketCAN socket that never blocks. It survives its interface: an absent, downed or removed one is
 // searched again by maintain(). One thread makes all calls.
 #pragma once

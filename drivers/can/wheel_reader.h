@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads wheel speeds from CAN frames, by message and signal of a DBC file.
 #pragma once
 

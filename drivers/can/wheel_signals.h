@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the wheel speed signals of a vehicle's DBC file.
 #pragma once
 

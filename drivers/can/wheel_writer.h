@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes wheel speeds into CAN frames, by message and signal of a DBC file. WheelReader reads the same
 // frames.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Passes finished requests, and the removal of the camera, from libcamera's thread to the capture thread.
 //
 // A fixed ring: it holds each request at most once, so it cannot overflow. push() does not wait; the capture

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera by libcamera.
 //
 // libcamera's signals arrive on its own thread and only pass on the number of the finished request

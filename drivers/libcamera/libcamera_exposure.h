@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Chooses the exposure and gain controls of the next requests of a libcamera camera.
 #pragma once
 

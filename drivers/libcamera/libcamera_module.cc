@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Implements libcamera_system.h by libcamera: the module that farpointd loads. Written against 0.0.3 with
 // calls that later versions keep; LIBCAMERA_VERSION_* or types select where they differ.
 #include <libcamera/libcamera.h>

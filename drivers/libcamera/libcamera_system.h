@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The part of libcamera that Farpoint uses, in plain types: the interface of the module. Only the module
 // links libcamera, since its libraries would be locked in farpointd's memory unused; only camera.driver
 // libcamera loads the module (libcamera_loader.h). Tests implement the same interface.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads the measurements of a recorded LCM log, in the order of the file, checked, with counts of refused
 // ones. An image whose time leaps waits until the next image confirms it (kMaxLeap_us). Not thread-safe;
 // waits for the disk.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sets exposure and gain of a V4L2 camera by the controls that it has. Capture thread.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera by V4L2.
 #pragma once
 

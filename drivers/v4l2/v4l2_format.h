@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Negotiates the format of a V4L2 camera.
 #pragma once
 

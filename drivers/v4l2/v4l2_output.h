@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes grey images into a V4L2 output device, such as v4l2loopback's.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/v4l2_stream.h"
 
 #include <linux/videodev2.h>

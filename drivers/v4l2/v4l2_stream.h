@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Maps the driver's buffers of one streaming V4L2 node, takes filled ones and returns them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The system calls of a V4L2 camera. Tests implement them in place of the kernel.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The wheels' motion between two body poses, as a factor of a bundle problem.
 //
 // Residual, 3x1, whitened by the motion's covariance C = L L':

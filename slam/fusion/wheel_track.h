@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The wheels' last seconds: a ring of samples, and the body's planar motion between two times.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The state of the body that sensors beside a camera measure: pose, velocity, biases of the IMU.
 //
 // Perturbation of 15 entries, in this order: translation and rotation as in se3.h (body axes), velocity

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Camera models: pinhole + radial-tangential (k1 k2 p1 p2 k3) and Kannala-Brandt (k1..k4, "equidistant").
 //
 // Camera axes: x right, y down, z forward. Pixels: (0,0) is the centre of the upper left pixel, u right, v

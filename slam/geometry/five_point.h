@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Minimal solver for the essential matrix.
 #pragma once
 

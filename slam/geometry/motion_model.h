@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the body is expected at a time: what tracking starts a frame from. Constant velocity implements it
 // from frames alone; slam/fusion implements it from wheels and inertial measurements.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Absolute pose of a camera from bearings and known points, with outliers: for relocalisation.
 #pragma once
 

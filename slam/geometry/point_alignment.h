@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Alignment of two sets of points: trajectories against truth, maps against maps.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real roots of low-degree polynomials, for the minimal solvers.
 #pragma once
 

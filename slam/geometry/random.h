@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small deterministic random generator for sampling matches. The standard library fixes its engines'
 // sequences but not its distributions', so samples drawn with those would differ between compilers.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Models that relate unit bearings of two views - essential motion, homography of a plane, rotation alone -
 // with angular residuals that hold for any field of view, and their refinement.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cameras on the body and where each of them stands.
 #pragma once
 

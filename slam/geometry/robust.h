@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Robust costs: quantiles that tell outliers, and Huber's loss.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rigid motions and similarities.
 //
 // Names: T_A_B maps coordinates of frame B into frame A, so T_A_C = T_A_B * T_B_C and p_A = T_A_B * p_B.

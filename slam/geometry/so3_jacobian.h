@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Derivatives of the exponential map of SO(3), for residuals that hold a rotation's logarithm.
 // Source: Sola, Deray, Atchuthan, "A micro Lie theory", equations 143 to 146.
 #pragma once

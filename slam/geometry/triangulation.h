@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Triangulation from unit bearings, sound for nearly parallel rays and for fields of view beyond 90 degrees.
 //
 // A landmark is its host's bearing and the inverse depth along it: p_host = bearing_host / inverse_depth, in

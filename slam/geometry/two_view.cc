@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "slam/geometry/two_view.h"
 
 #include <Eigen/Geometry>

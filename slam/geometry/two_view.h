@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Geometry of two views for automatic initialisation: motion up to scale, inliers and structure from matched
 // bearings with outliers, or the reason why there is none.
 #pragma once

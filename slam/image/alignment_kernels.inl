@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Kernels of patch alignment: part of kernels_simd.cc, compiled once for every instruction set inside its
 // namespace. A template row has eight pixels: one vector of eight floats or two of four. No fused
 // multiply-add: not every instruction set has it, and the bits must be the same.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Choice of corners that are strong and spread evenly over the image.
 #pragma once
 

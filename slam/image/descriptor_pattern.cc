@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs drawn from an isotropic Gaussian of sigma 31/5 px around the corner.
 #include "slam/image/descriptor_pattern.h"
 

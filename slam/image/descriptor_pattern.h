@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The point pairs of the binary descriptor.
 #pragma once
 

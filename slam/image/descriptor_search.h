@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Search for the feature near a pixel whose descriptor fits best. Tracking's thread and mapping's; makes no
 // heap call.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // FAST corners spread over the image, oriented, with binary descriptors.
 #pragma once
 

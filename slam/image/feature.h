@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What one image gives the estimator: corners, descriptors, and patches for sub-pixel measurement.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the features near a pixel. Built once a frame, no allocation after the constructor.
 #pragma once
 

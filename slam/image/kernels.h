@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The inner loops of image processing, as a table of functions: a plain C++ version, which is the definition
 // and the reference of the tests, and Highway versions for every instruction set, chosen at run time. All
 // arithmetic is integer, or float in one fixed

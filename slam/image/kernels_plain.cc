@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The definition of every kernel, without any cleverness. The Highway versions must give the same bits.
 #include <algorithm>
 #include <bit>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Highway versions of the kernels: compiled once for every instruction set, the best one is chosen at run
 // time. The plain versions in kernels_plain.cc say what is computed; the comments here say only how.
 #include <algorithm>

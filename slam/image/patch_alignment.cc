@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // PyramidImage: patches and their alignment (inverse compositional Lucas-Kanade; Baker & Matthews, IJCV
 // 2004).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scale pyramid of a grey image, in memory allocated once.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keyframes of one map in the order of time, and what was measured between each and the next.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which keyframes share landmarks: keeps Keyframe::covisible of all keyframes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A frame: what the cameras of the rig show at one time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory for lists that grow through a whole run (std::pmr::deque): in slabs of their own. Block by block
 // from the heap they would lie between what comes and goes there, and keep its holes from ever closing.
 #pragma once

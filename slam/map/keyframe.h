@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A keyframe: a frame that the map keeps.
 #pragma once
 

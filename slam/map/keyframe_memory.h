@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory of the arrays of keyframes' views: allocated and touched at the start, used again by later
 // keyframes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The one landmark type of every mode: a bearing in an anchor camera, inverse depth along it, and its sigma.
 #pragma once
 

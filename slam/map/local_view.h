@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tracking sees of the map: an immutable copy of the landmarks around the vehicle, made by mapping and
 // handed over whole. Everything the tracker needs of a landmark is here, in world axes, so that it never
 // touches the map.

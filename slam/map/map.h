@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The map: pools of keyframes and landmarks and the links between them. Mapping is its only writer; tracking
 // reads LocalView copies. Keeps both sides of every link consistent:
 //     keyframe.views[o.camera].landmarks[o.feature] == landmark

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory for the landmarks' observations: taken and touched at the start, lent out in pieces of a few sizes,
 // and used again. More is taken from the heap only when all of it is lent.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One value a camera of the rig.
 #pragma once
 

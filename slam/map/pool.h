@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fixed-capacity storage with generation handles. A handle to something that has gone never resolves to what
 // took its place, and nothing moves or allocates after construction.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a landmark should appear in a camera. Shared by tracking and mapping.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tracking hands to mapping: sightings, keyframe requests, the pair that a map starts from.
 #pragma once
 

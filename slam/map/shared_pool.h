@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A fixed number of objects, made at start and lent out as shared_ptr again and again: no heap call when one
 // is taken or given back, and no destructor runs on a thread that must not wait for the heap.
 #pragma once

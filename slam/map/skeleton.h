@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where every keyframe of the run stands, also after the map removed it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refines a camera's calibration from the map (ours; not in the paper).
 //
 // A rectified or factory calibration is good to about a pixel, and a small bias of it is the same in every

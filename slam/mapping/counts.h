@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Counts of what mapping has done since the start, for status and reports.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Duplicates: landmarks of one keyframe are searched in another; two landmarks on one corner are fused.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The features of one keyframe laid out for searches along epipolar lines.
 //
 // Mapping searches thousands of lines through every neighbour of a new keyframe: what a line passes is found

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the map forgets: keyframes that say nothing new, and the oldest where memory ends.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Makes keyframes of frames.
 #pragma once
 

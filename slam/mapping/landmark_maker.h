@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Algorithm 1 of Dou et al. 2024 as METHOD.md reads it: feature pairs between a new keyframe and its
 // neighbours become map points at once where the parallax suffices, and virtual map points (VMP, here
 // landmarks of state `bearing`) that wait for parallax where it does not.

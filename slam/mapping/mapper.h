@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mapping: keyframes in, local views out. The only writer of the map.
 //
 // Orders the work on one keyframe; each step is a part of its own (duplicates, landmark_maker, probation,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a keyframe measures of a landmark: the aligned place of its patch near a corner.
 #pragma once
 

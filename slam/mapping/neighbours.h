@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Neighbours of a keyframe in the covisibility graph.
 #pragma once
 

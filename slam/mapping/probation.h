@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Probation of new landmarks: those that tracking rarely finds, or that no keyframe sees again, are removed.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a map can be used as a measure: its unit is steady, and its adjustments are sound.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a map is sound: whether what bundle adjustment leaves in the residuals is what the measurements'
 // errors leave, or something that bends the map: a rolling shutter under fast rotation, a wrong calibration,
 // a scene that moves.

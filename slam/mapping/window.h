@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The window of local bundle adjustment: from the map to a problem for the solver, and back.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bundle adjustment over body poses and host-anchored inverse depths, as plain arrays that all solvers share.
 //
 // Residual of one measurement, in units of its sigma:

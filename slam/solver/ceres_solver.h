@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bundle problem by Ceres: the reference that tests hold SchurSolver to, and `mapping.solver: ceres`.
 //
 // Not part of the estimator's library: Debian's Ceres brings GPL code. Tests and tools link it; farpointd

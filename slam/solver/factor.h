@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One measurement between states of a bundle problem: wheels, inertial measurements, priors.
 //
 // Landmark measurements are not factors: they are many, and the solver handles them without virtual calls.

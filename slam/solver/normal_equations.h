@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The normal equations of poses, motions and globals: where each state stands in them, and their sums.
 //
 // Pose steps are in world axes, as schur_blocks.h says. Motions and globals stand behind all poses.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the solvers on the Schur complement share: pose derivatives in world axes, and the blocks of the
 // normal equations.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Levenberg-Marquardt on the Schur complement of one-dimensional landmarks.
 //
 // Eliminating an inverse depth is a division by a scalar, so a landmark seen by k free poses costs

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The states that a bundle problem solves for beside inverse depths: poses, motions, globals.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The motion model of frames alone: the body goes on as it moved between the last two accepted frames.
 #pragma once
 

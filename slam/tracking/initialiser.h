@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Waits for two frames whose matches say how the camera moved and where the points are. Invents nothing:
 // rotation alone, a plane that can be read two ways, or too little parallax mean waiting.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When a frame is worth remembering.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Association of one frame's features with the landmarks of the local view: project, match, align.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The fine step of tracking: a frame's pose from its matches with the whole local map.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Robust 6-DoF pose of the body from landmarks and a prior. Fixed size, no heap.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back after frames without a pose: descriptors and perspective-n-point (PnP).
 #pragma once
 

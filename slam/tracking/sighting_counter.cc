@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "slam/tracking/sighting_counter.h"
 
 #include "slam/tracking/work_space.h"

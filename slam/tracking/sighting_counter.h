@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How often each landmark should have been, and was, seen since the last keyframe.
 #pragma once
 

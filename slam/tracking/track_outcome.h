@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tracking found out about one frame.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Frame -> pose against an immutable local view: prior, coarse pose, fine pose. Reads no map and never waits.
 #pragma once
 

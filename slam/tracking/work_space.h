@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Work space of the running path: sized and touched at start, reused afterwards.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solve_schur against solve_ceres at the size of a local bundle adjustment: 20 free and 20 fixed poses, 4000
 // points, 8 observations each; and the tracker's pose solver.   bench_solvers
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Times image processing beside cv::ORB, the yardstick, on the same frames.
 //   bench_image --benchmark_enable_random_interleaving=true --benchmark_repetitions=5
 // p50 and p99 are thread-CPU milliseconds a frame. Recorded frames (../shared/data) where they exist, made

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A live run in a test: cameras of film, a configuration for them, and what was published.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The live daemon with a camera of film: what it does with a camera that comes, goes and hangs, what it tells
 // the service manager, and that what it recorded replays to the same bytes.
 #include "daemon/live.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole daemon by replay: what goes in wrong, what comes out, and that it comes out the same.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

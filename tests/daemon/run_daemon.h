@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs of the daemon in the test's own process, and what they leave behind.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Short recorded logs for tests, made from a world of small textured squares.
 #pragma once
 

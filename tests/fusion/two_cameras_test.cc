@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The seam for more than one camera: a metric rig of two, from frames through map and solver to tracked
 // poses.
 //

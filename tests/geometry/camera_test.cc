@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras: round trips over the whole image, derivatives against differences, refusals, checks.
 #include "slam/geometry/camera.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts below two-view and PnP: roots, five points, homographies, rotations, epipolar residuals and
 // refinement.
 #include <gtest/gtest.h>

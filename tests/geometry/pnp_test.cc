@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pose from bearings and points.
 #include "slam/geometry/pnp.h"
 

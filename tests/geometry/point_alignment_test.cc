@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Umeyama alignment.
 #include "slam/geometry/point_alignment.h"
 

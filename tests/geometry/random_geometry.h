@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Random rotations, poses and numbers for the geometry tests. Fixed seeds only.
 #pragma once
 

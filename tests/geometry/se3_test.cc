@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Properties of rotations, rigid motions and similarities over random and special elements.
 #include "slam/geometry/se3.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Triangulation: exact, noisy with the predicted sigma, nearly parallel rays, refusals.
 #include "slam/geometry/triangulation.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Automatic initialisation from two views over the scenes it meets: general, planar, rotating, driving, far,
 // with wrong matches; exact and noisy.
 #include "slam/geometry/two_view.h"

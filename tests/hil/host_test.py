@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: host_test.py ROOT
 
 The bench's checks on the host find what they are there to find: each on good data and on data with one fault. No

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // build(), extract() and align() allocate nothing once a first frame has passed.
 #include <gtest/gtest.h>
 

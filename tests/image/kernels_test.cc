@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every SIMD version of every kernel gives the bits of the plain version, and the plain version is what it
 // says.
 #include "slam/image/kernels.h"

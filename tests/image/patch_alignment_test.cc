@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Patch alignment against exact truth: formulas, and recorded images whose pixels are put together to coarser
 // ones so that two images with a known sub-pixel shift or scale arise without any interpolation.
 #include <gtest/gtest.h>

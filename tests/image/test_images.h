@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Images for the tests: made from formulas, or read from the recordings beside the project where they exist.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A small DBC reader for tests: messages, signals, value tables and the E2EDataId attribute. It shares
 // nothing with the codec.
 #pragma once

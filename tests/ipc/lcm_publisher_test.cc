@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "ipc/lcm_publisher.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A map over a simple camera, filled by hand: what the tests of the map need in place of images.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tests of the map share: checks of every link, random operations, and a map to be filled by hand.
 #pragma once
 

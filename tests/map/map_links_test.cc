@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Links, lists and the chain stay consistent whatever is done to the map.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A landmark stays where it is when its host changes.
 #include <gtest/gtest.h>
 

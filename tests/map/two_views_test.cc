@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A keyframe of two cameras: a landmark may be seen by both.
 #include <gtest/gtest.h>
 

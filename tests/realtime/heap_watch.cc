@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/realtime/heap_watch.h"
 
 #include <execinfo.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Threaded replay of recordings: no heap on the threads that must not wait for it, and a run that repeats.
 #include <gtest/gtest.h>
 

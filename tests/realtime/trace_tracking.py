@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: trace_tracking.py FARPOINTD LOG [SPEED]
 
 Runs a threaded replay under strace and lists the system calls of the tracking thread from the frame on that first

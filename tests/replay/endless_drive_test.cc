@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // KITTI 03 driven forth and back for 3000 frames: memory and tracking's time must not know how long it has
 // been.
 #include <gtest/gtest.h>

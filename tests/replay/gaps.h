@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Replays a recording with stretches of its images taken away, and measures how the estimator finds back:
 // into which map, how soon, and whether the poses it then calls valid are right by the recording's truth.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // farpointd live, as it is started on a vehicle, with the driver that is built in.
 #include <gtest/gtest.h>
 

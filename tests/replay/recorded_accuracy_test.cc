@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whole recordings through the programs: import, lockstep replay, evaluation. The bounds are the peer's
 // figures on the same recordings (ORB-SLAM3, monocular, final trajectory, sim3), not what this version
 // happens to reach.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // KITTI 03 with threads of their own, through the programs: memory, accuracy at the camera's pace,
 // repetition.
 #include <gtest/gtest.h>

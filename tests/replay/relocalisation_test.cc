@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Half a second to two seconds without images, anywhere in a recording: the way back into the same map.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: same_bytes.py record BIN LOGS OUT       replays every log of the folder LOGS in lockstep, results into OUT
        same_bytes.py compare BEFORE AFTER [TYPES]  compares two such folders; status 1 where they differ
 

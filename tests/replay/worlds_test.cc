@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A simulated world through the programs, in both modes: one seed of what tools/compare_modes does with five.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A drive without end: memory and tracking's time must not know how long it has been.
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs the estimator through a simulated scene and compares what it made with the truth.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Algorithm 1 step by step: a map filled by hand, keyframes with known poses, simulated pixels.
 #include "slam/mapping/landmark_maker.h"
 

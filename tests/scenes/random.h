@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Seeded randomness of the simulator. The standard fixes its engines' sequences but not its distributions',
 // so those are written out here: the same seed gives the same world with every compiler.
 #pragma once

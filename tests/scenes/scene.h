@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The simulated drives: camera, motion, surroundings and noise.
 #pragma once
 

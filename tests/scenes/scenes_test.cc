@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The estimator in simulated worlds: initialisation, life of virtual map points, scale, forgetting, sigma,
 // modes.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares virtual map points with the baseline over simulated scenes, paired seed by seed.
 //   sim_compare [--seeds N] [--first SEED] [--scene NAME|all] [--frames N] [--features N] [--init-parallax
 //   RAD]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns a scene into what the image processing would have handed to the estimator, frame by frame, with the
 // truth.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The simulator itself: what it says it does, it does.
 #include "tests/scenes/simulator.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points with exact positions, generated along a path: any stretch of the world can be made again from its
 // number, so that an endless drive needs no endless memory.
 //

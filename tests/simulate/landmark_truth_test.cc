@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Landmarks against the simulated world: perfect ones are right, and errors put in come out.
 #include "tools/evaluate/landmark_truth.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The true motion and what the inertial and wheel sensors make of it.
 #include <gtest/gtest.h>
 

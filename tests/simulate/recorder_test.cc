@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Simulated logs: the same bytes from the same seed, readable after every kind of ending.
 #include <gtest/gtest.h>
 

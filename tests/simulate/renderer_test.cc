@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The renderer on scenes so simple that the right picture is known.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The report's parts, and the whole of it on a simulated run.
 #include "tools/report/report.h"
 

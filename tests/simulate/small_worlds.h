@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Requests for small pictures of the shipped worlds.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Streaming a simulation: when things go out, what they carry, and what is said where they cannot.
 #include <gtest/gtest.h>
 #include <linux/can.h>

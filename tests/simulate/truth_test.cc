@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The renderer's truth against its pictures: a point of one frame, put into space by the true depth and seen
 // from the next frame's true pose, must lie on the same texture.
 #include <gtest/gtest.h>

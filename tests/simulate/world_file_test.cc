@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // World files: the shipped ones are right, and every kind of mistake is named with file, line and key.
 #include <gtest/gtest.h>
 

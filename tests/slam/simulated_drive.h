@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A simulated drive at the level of features: frames for the tests of the facade and its halves.
 #pragma once
 

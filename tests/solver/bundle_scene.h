@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Random bundle problems with known truth, for the tests and the bench of the solvers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the tests of factors share: random states, numeric derivatives.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the sources and the build lie. The paths are compiled into one file of their own, so that the objects
 // of all other tests are the same in every clone and ccache finds them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A world of points with exact pixels, and maps of it: material for the tests of mapping, without images.
 #pragma once
 

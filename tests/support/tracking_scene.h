@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A rigid scene as tracking meets it: a local view of its landmarks, and frames with their features from any
 // pose. Exact except what a test disturbs, so that expected values need no tolerance for noise.
 #pragma once

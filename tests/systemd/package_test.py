@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: package_test.py BUILD_FOLDER CMAKE CPACK
 
 What cmake --install puts where, and the .deb: its files, its conffiles, that its scripts parse, and no error of lintian.

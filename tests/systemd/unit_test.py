@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: unit_test.py UNIT FARPOINTD
 
 The service unit: systemd-analyze verify has nothing to say (it returns 0 even for unknown keys, so its standard error

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Trajectory files, pairing, alignment and relative errors.
 #include "tools/evaluate/accuracy.h"
 

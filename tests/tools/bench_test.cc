@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What `farpoint bench` makes of the times of single frames, and the command as a whole.
 #include <gtest/gtest.h>
 

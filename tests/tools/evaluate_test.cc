@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Run logs against truth: figures, tables, JSON, conditions.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Importers: what they find in recordings of each layout, and what they say about malformed ones.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The built program: exit statuses, one line on standard error, agreement with the independent check.
 #include <gtest/gtest.h>
 

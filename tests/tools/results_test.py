@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """tools/results: manifest, rendering, age, exact comparison, bootstrap, progress.
 
 usage: results_test.py SOURCE_FOLDER

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/spy/spy_command_line.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the tests of the tools share: a scratch folder, made-up recordings, and running the built program.
 #pragma once
 

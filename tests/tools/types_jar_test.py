@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: types_jar_test.py JAR TYPES_FOLDER
 
 The jar holds the class of every LCM type and nothing else, for Java 11 and later.

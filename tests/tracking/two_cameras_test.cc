@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tracking with frames of two cameras.
 #include <gtest/gtest.h>
 

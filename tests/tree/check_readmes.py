@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Checks READMEs: every folder has one, and every path that one names exists.
 
 usage: check_readmes.py [FOLDER]      Prints one line a finding; status 1 where there is one.

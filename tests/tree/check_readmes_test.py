@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The README check finds folders without one, and paths that are not there."""
 
 import pathlib

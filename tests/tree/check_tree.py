@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The tree is the architecture: checks which folder may include which, the length of files, and READMEs.
 
 usage: check_tree.py [--warnings] [FOLDER]      Prints one line a finding; status 1 where there is one.
@@ -224,6 +225,22 @@ def warnings(root: pathlib.Path):
     return [*warn_of_classes(root), *warn_of_lengths(root), *warn_of_folders(root)]
 
 
+SPDX = "SPDX-License-Identifier: Apache-2.0"
+LICENSED = {".h", ".cc", ".c", ".inl", ".cjs", ".py", ".sh", ".cmake"}
+
+
+def check_spdx(root: pathlib.Path):
+    """Every source names its licence in its first line, or in the second below '#!'."""
+    for top in (*TOPS, "systemd"):
+        for file in sorted((root / top).rglob("*")):
+            is_source = file.suffix in LICENSED or file.name == "CMakeLists.txt"
+            if not is_source or not file.is_file() or "node_modules" in file.parts:
+                continue
+            lines = file.read_text().splitlines()[:2] + ["", ""]
+            if SPDX not in lines[1 if lines[0].startswith("#!") else 0]:
+                yield f"{file.relative_to(root).as_posix()}: does not begin with '{SPDX}'"
+
+
 def check(root: pathlib.Path):
     return [*check_includes(root), *check_headers(root), *check_lengths(root)]
 
@@ -239,7 +256,7 @@ def main():
     if options.warnings:
         for warning in warnings(root):
             print(f"warning: {warning}")
-    findings = check(root) + check_readmes.check(root)
+    findings = check(root) + check_readmes.check(root) + list(check_spdx(root))
     for finding in findings:
         print(finding)
     sys.exit(1 if findings else 0)

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The tree check finds what it promises to find, and nothing else."""
 
 import pathlib
@@ -101,6 +102,15 @@ class CheckTree(unittest.TestCase):
         files["ipc/b.cc"] = ""
         self.assertIn("ipc: 21 units", self.warnings(files)[0])
         self.assertEqual(self.warnings(files | {"ipc/README.md": "Large folder: one type each."}), [])
+
+    def test_sources_name_their_licence(self):
+        line = check_tree.SPDX
+        for path, content in {"slam/a.h": f"// {line}\n", "tools/a.py": f"#!/usr/bin/env python3\n# {line}\n",
+                              "ipc/CMakeLists.txt": f"# {line}\n", "ipc/README.md": "text\n"}.items():
+            self.assertEqual(self.findings({path: content}, lambda root: list(check_tree.check_spdx(root))), [], path)
+        for path, content in {"slam/a.h": f"#pragma once\n// {line}\n", "tools/a.py": "", "systemd/CMakeLists.txt": "\n"}.items():
+            found = self.findings({path: content}, lambda root: list(check_tree.check_spdx(root)))
+            self.assertEqual(found, [f"{path}: does not begin with '{line}'"])
 
 
 if __name__ == "__main__":

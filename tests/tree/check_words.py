@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Checks the words of comments, READMEs and messages by the rule of tests/README.md.
 
 usage: check_words.py [--prune] [FOLDER]      Prints one line a finding; status 1 where there is one.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The word check finds what the rule refuses, where people read it."""
 
 import pathlib

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: include_cost.py [N]      Prints the N (10) headers that most translation units include, directly or not."""
 
 import collections

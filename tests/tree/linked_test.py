@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: linked_test.py BUILD_FOLDER
 
 Holds the libraries that farpointd, its modules and farpoint load, with all that those load in turn, to a list.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """usage: skipped_tests.py RESULTS.xml      RESULTS.xml: written by ctest --output-junit
 
 Where the recordings are there and tools/deps has run, only a missing permission excuses a skipped test. Prints the

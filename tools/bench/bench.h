@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a recording through the estimator, frame by frame beside the yardstick.
 #pragma once
 

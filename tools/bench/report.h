@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Computes the output of `farpoint bench` from the times of single frames.
 //
 // Times are comparable only with those of known work on the same machine at the same moment. The yardstick is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Flags and small functions used by every folder.
 
 set(CMAKE_CXX_STANDARD 20)

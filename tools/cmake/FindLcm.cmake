@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # LCM ships no CMake file, and its pkg-config file requires GLib's headers, which Farpoint does not need.
 #   Lcm::lcm      the library          LCM_GEN   the type compiler
 find_path(LCM_INCLUDE_DIR lcm/lcm.h)

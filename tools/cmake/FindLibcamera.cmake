@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # libcamera, by its headers and libraries: pkg-config is not needed elsewhere.
 find_path(LIBCAMERA_INCLUDE_DIR libcamera/libcamera.h PATH_SUFFIXES libcamera)
 find_library(LIBCAMERA_LIBRARY camera)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # libsystemd, by its header and library: pkg-config is not needed elsewhere.
 find_path(SYSTEMD_INCLUDE_DIR systemd/sd-daemon.h)
 find_library(SYSTEMD_LIBRARY systemd)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sub-commands of `farpoint`. Each add_*() declares one on the command line and, if it was given, sets
 // `action`, which does the work and returns the exit status.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `farpoint simulate --stream`: opens the devices of its options, streams, and prints a closing line with
 // lateness and pace.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <lcm/lcm.h>
 #include <poll.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two kinds of failure of a command of `farpoint`. Both carry one line with what is wrong, where, and
 // what was expected; the type gives the exit status.
 #pragma once

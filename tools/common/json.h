@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A JSON value to print or to query. Objects keep their order of insertion.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A progress bar on standard error; silent unless that is a terminal.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Line-oriented text files of the data sets. Fields carry file and line, which every error names.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Errors of an estimated trajectory against truth: pairing, alignment, absolute and relative errors.
 //
 // Pairing and absolute error are defined as in the independent check that the tests run beside this code:

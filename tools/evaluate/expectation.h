@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Conditions on evaluated runs, for tests and CI: `NAME.METRIC OP [FACTOR] NAME.METRIC` or `NAME.METRIC OP
 // NUMBER`.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Figures of judged landmarks: error by true distance, claims against errors, and how early far ones became
 // points.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Judges the landmarks of a run by the world of a simulated recording. The recording's SIMULATION message
 // makes that world again; a ray through the pixel that first saw a landmark gives its true distance.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads LCM logs for evaluation and export: a recording's truth and farpointd's output.
 #pragma once
 

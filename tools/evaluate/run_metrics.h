@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Metrics of one run against truth.
 //
 // Definitions. final: every frame's pose in the map with most frames, after the last optimisation. live: the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Figures from FARPOINT_TIMING besides tracking's time: age of poses at output, and growth of time and memory
 // over a long run.
 #pragma once

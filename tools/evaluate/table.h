@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Evaluation as text: details of each run, then one table with one row a run.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
 # Runs in the guest: the scenarios that share this machine, one after the other, each cleaned up after. What a scenario
 # leaves is in /hil/NAME: out, status, seconds, and what it puts there. One that boots the machine again begins anew.
 export root=/hil

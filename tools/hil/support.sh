@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What scenarios share. $left is the folder that the host reads afterwards. The machine's clock runs on, and fast, while
 # all wait for that folder; nothing else waits for the host. So what must be quick is in /tmp.
 daemon_log=/tmp/daemon.log

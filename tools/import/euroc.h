@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // EuRoC (ASL) layout: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}/{data.csv,sensor.yaml}. Only cam0 is
 // needed.
 #pragma once

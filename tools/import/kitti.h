@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // KITTI odometry layout: ROOT/sequences/SEQUENCE/{calib.txt, times.txt, image_0/, image_1/, gps_xy.txt} and
 // ROOT/poses/SEQUENCE.txt. Only calib.txt (line P0) and image_0 are needed.
 #pragma once

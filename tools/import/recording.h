@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A recording of a public data set: its sensors, and their samples in order of time. Image bytes stay in
 // their files until they are copied into the log.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes a Recording as an LCM log: CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in order of time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/import/tum.h"
 
 #include "daemon/config/camera_file.h"

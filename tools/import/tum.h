@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // TUM RGB-D layout: rgb.txt (`timestamp filename`), the images it names, groundtruth.txt
 // (`timestamp tx ty tz qx qy qz qw` of the colour camera). Depth is not read.
 #pragma once

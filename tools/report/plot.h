@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A diagram with two labelled axes. Lines differ in dash and thickness as well as in colour, so that they
 // stay distinct in grey.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A report on runs as one HTML file that needs nothing else: no network, no script.
 #pragma once
 

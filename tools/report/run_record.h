@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Content of one run's output log for a report, in order of time.
 #pragma once
 

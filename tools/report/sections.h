@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of a report, each as HTML; empty without data in the runs.
 #pragma once
 

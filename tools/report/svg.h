@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SVG as text: shapes in pixels, y down, attributes by style classes of the page (tools/report/page.h).
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What of `farpoint evaluate --json` is kept. Measured times and memory are left out: all that stays is the same in
 each lockstep replay of one log."""
 

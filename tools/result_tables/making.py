@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the commands of a table and keeps what they print."""
 
 import concurrent.futures

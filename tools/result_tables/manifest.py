@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every table of tests/RESULTS.md with the commands that make it. In commands {bin} is the build's folder of programs,
 {data} the folder of recordings, {jobs} an option. Each row runs in a folder of its own; its last command prints JSON.
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bar with the time left, on standard error. Silent where that is no terminal."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables in Markdown from results, between markers: <!-- results:NAME --> ... <!-- /results:NAME -->."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Medians of paired ratios, and how uncertain they are."""
 
 import random

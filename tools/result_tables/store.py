@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results as JSON files of tests/results: one a table, with what they were made from."""
 
 import datetime

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A simulated recording: a world, the vehicle's motion through it, and its sensors' measurements at any time.
 //
 // Made again from a log's SIMULATION message, the same object gives the true distance along any pixel of any

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Command line of lcm-spy with Farpoint's types. Debian's own script fails with Java after 11, since it
 // selects a removed garbage collector.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The picture of `farpoint top`: the newest messages of a running farpointd, and rates and latencies over
 // several of them.
 #pragma once

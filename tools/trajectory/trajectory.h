@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Trajectories and their text form: TUM format, one pose a line, `seconds tx ty tz qx qy qz qw`, '#' starts a
 // comment.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // IMU and WHEELS messages on their way from a log into the estimator.
 #include "daemon/input/measurement_feed.h"
 

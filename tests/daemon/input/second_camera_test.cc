@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The second camera, the first one's capture thread and the recorder, each on a thread of its own.
 #include "daemon/input/second_camera.h"
 

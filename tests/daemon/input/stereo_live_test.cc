@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Live runs with two cameras of film: what is counted, what is recorded, and that the second one can go
 // without any harm to the first.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The second camera and the matching of its images with the first one's, turn by turn without threads; and
 // the recorder with two cameras.
 #include "daemon/input/stereo_watch.h"

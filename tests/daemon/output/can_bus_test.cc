@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Odometry on the bus: one clock sends, one epoch is in flight, and never a stale number.
 #include "daemon/output/can_bus.h"
 

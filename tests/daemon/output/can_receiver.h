@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A receiver on the other end of a socket that stands for the bus: it decodes by the DBC file and confirms
 // frames.
 #pragma once

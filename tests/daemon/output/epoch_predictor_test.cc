@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is true at the moment of sending.
 #include "daemon/output/epoch_predictor.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a run publishes, kept in memory: sinks for the tests of what hands frames over.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The ways out, decoded by what a receiver has: the DBC file, and LCM's own log reader.
 #include <gtest/gtest.h>
 #include <lcm/eventlog.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The threads of the vehicle over a source of images made by hand.
 #include "daemon/pipeline/pipeline.h"
 

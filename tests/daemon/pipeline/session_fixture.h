@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A session over the synthetic camera, with sinks that keep what it publishes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A watchdog is told of progress, soon after it was made and never without it.
 #include "daemon/system/service_manager.h"
 

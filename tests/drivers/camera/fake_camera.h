@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera in memory, whichever driver is to drive it: what tests ask of all of them.
 #pragma once
 

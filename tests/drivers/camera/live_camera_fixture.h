@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A live camera over a fake one, as the tests of all drivers begin. A driver shows that it does what all have
 // in common (live_camera_test.cc) by
 //   INSTANTIATE_TEST_SUITE_P(Driver, LiveCameraTest, testing::Values(&test::make_fake<FakeOfTheDriver>));

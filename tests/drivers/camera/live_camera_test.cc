@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every camera driver promises; drivers bring their fake camera (live_camera_fixture.h).
 #include "drivers/camera/live_camera.h"
 

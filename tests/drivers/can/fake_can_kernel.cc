@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/drivers/can/fake_can_kernel.h"
 
 #include <dlfcn.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A kernel with one CAN interface in the place of this machine's, which may have none. While one is alive,
 // the program's socket calls for CAN go to it; all others pass.
 #pragma once

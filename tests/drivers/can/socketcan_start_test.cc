@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A bus that is not ready when the daemon starts is waited for, with a kernel that can be made so.
 #include <gtest/gtest.h>
 #include <linux/can.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/drivers/libcamera/fake_libcamera.h"
 
 #include <poll.h>

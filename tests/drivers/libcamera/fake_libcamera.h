@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // libcamera with one camera in memory, for tests of the driver: requests go round as they do there, and what
 // a test asks for goes wrong.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/libcamera/libcamera_device.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/drivers/v4l2/fake_v4l2.h"
 
 #include <algorithm>

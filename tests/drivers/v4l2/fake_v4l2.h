@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A V4L2 camera in memory, for tests of the driver: it answers the same requests with the same structures as
 // the kernel does, and does wrong what a test asks for.
 #pragma once

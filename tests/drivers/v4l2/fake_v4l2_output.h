@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A V4L2 output device in memory: takes images, gives buffers back in order, and does wrong what a test asks
 // for.
 #pragma once

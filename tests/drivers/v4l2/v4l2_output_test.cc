@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/v4l2_output.h"
 
 #include <gtest/gtest.h>

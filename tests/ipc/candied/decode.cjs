@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // usage: node decode.cjs FILE.dbc LOG.candump      CSV on standard output: utime,message,signal,value
 //
 // Knows nothing of Farpoint but the DBC file: value is in the DBC's units, empty where the signal's value table calls

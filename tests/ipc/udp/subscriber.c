@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A subscriber that is not Farpoint's code: lcm-gen's C types and LCM's own library. Prints one line a message: channel,
 // utime, and the FNV-1a hash of the message decoded and encoded again, so that every member counts. Ends on the channel
 // END, or after half a minute.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A receiver of the daemon's CAN frames that uses the DBC alone, without a line of the sender's code."""
 
 import dataclasses

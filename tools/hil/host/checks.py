@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the host checks of what a scenario left: each check gives (complaint or None, figures)."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """LCM logs, read and written anew here: the bench shares no code with what it tests."""
 
 import dataclasses

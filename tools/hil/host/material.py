@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What scenarios are given: the programs under test, the bench's own, a simulated sequence, the package."""
 
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenarios: small shell scripts that run in the guest, with a head that says the rest.
 
     # What is proved, in one line.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // To be preloaded: gives the virtual USB host controller (vhci-hcd) a node of the machine's firmware.
 // libcamera makes a USB camera's id of the controller's node, and lists no camera of a controller that has
 // none. The text of the node is that of the file $FIRMWARE_NODE.

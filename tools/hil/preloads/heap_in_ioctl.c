@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // To be preloaded: every ioctl takes memory from the heap and gives it back.
 #define _GNU_SOURCE
 #include <stdarg.h>

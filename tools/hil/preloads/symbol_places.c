@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // To be preloaded to any program: prints "NAME FILE OFFSET" of the heap's functions, for the kernel's
 // uprobes.
 #define _GNU_SOURCE

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // usage: play DEVICE WIDTHxHEIGHT RATE COUNT GO_FILE FRAMES_FILE [LEAVE_OUT]
 //
 // Plays raw grey frames to a video output device, RATE a second, each with the time at which it was due as

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // usage: stop_thread PID NAME SECONDS
 //
 // Holds the threads of that name of a process for so long while its others run on: what a hung thread looks

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // usage: usb_camera WIDTHxHEIGHT RATE FRAMES_FILE [COUNT]
 //
 // Emulates a USB video class camera on the kernel's virtual host controller (vhci-hcd, USB/IP), so that the

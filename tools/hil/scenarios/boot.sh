@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The guest boots, runs the build's own programs on its own libraries, and hands their status to the host.
 #@ form: short
 #@ broken: the scenario ends with status 7

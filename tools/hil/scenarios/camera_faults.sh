@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # vivid: 30 % dropped buffers, buffers flagged as damaged, a fatal streaming error, a disconnected device.
 #@ form: long
 #@ check: status out.lcm images_missing=10..60 images_flagged=5..5 camera_losses=2..2 frames_tracked=80..200

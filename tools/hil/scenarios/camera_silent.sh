@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A USB camera that stops without an error: no_camera, its stream started anew, and tracked again when it goes on.
 #@ form: short
 #@ check: images run.lcm played 20000 1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Odometry at 50 Hz on vcan from images at 10 Hz, decoded by the DBC alone: rate, counter, CRC, age.
 #@ form: short
 #@ check: bus can.log played 50 valid

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Odometry at 50 Hz through the kernel's driver of one emulated SJA1000 controller, read from another on the same bus.
 #@ form: long
 #@ devices: -object can-bus,id=bus0 -device kvaser_pci,canbus=bus0 -device kvaser_pci,canbus=bus0

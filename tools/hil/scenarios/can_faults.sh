@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The bus's interface goes down, away, and its queue fills up: the frames come again by themselves, none of them stale.
 #@ form: long
 #@ check: bus after_down.log played 50

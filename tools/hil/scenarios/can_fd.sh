@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The same odometry at 50 Hz, an epoch in one CAN FD frame, on a vcan of its size.
 #@ form: long
 #@ check: bus can.log played 50 valid fd

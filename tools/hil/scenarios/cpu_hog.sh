@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Twelve processes at normal priority take all they can get of the one core: with real-time priority nothing is late.
 #@ form: long
 #@ check: images run.lcm played

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The machine boots with the service enabled and a USB camera that sends: from the kernel's start to the first pose.
 #@ form: long
 #@ machine: reboots

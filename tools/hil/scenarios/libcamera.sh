@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A USB camera of the kernel's uvcvideo through libcamera: every frame once, in order; unplugged and plugged in again.
 #@ form: long
 #@ needs: libcamera

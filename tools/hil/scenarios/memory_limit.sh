@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The service's memory limit is hit while it tracks: it alone is killed and comes again; with room it tracks again.
 #@ form: long
 #@ machine: systemd

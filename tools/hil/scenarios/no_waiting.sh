@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Five minutes of tracking, odometry and LCM going out: the kernel's tracer sees no heap call and one wait a thread.
 #@ form: long
 #@ seconds: 900

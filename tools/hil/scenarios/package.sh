@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all except the last.
 #@ form: long
 #@ machine: systemd

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A simulated sequence through v4l2loopback: every frame once, in order, with its time; replay gives the same poses.
 #@ form: short
 #@ check: images run.lcm played

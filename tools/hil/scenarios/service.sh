@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The service: ready, as its own user; a hung tracker and a killed process come again in time; it stops in order.
 #@ form: long
 #@ machine: systemd

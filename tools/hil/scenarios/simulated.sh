@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The simulator streams by itself: images into v4l2loopback, wheel speeds to vcan. At a twentieth of its pace.
 #@ form: long
 #@ check: streamed run.lcm out.lcm said 320x240 2

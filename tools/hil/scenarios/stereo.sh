@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Two loopback cameras of which the second stops halfway: all images are recorded, pairs counted, then those alone.
 #@ form: long
 #@ check: images run.lcm played

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The system's time jumps an hour forwards and back: images keep their times, tracking goes on.
 #@ form: long
 #@ check: images run.lcm played

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A USB camera of the kernel's uvcvideo, chosen by its port, is unplugged and plugged in again ten times while tracking.
 #@ form: long
 #@ check: images run.lcm played 20000 10

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # vimc, the kernel's emulated image sensor with a processing pipeline, through libcamera: it gives colours only.
 #@ form: long
 #@ needs: libcamera

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A simulated sequence through vivid's HDMI output, wired to its input: each image is a frame, in order, in its time.
 #@ form: long
 #@ check: wired run.lcm played 101700 100 10

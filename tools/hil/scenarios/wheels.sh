@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Wheel speeds of two messages of the vehicle's own DBC in over vcan, among other frames: each pair becomes a message.
 #@ form: long
 #@ check: wheels out.lcm wheels.log 80

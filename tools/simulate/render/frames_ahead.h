@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Renders images before they are due, a small bounded number of frames ahead.
 #pragma once
 

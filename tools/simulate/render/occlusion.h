@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Occlusion culling: skips what is hidden behind faces already drawn.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tools/simulate/render/ray_table.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rays of each pixel of a camera, and the cells of the perspective views that the scene is drawn into. Lens
 // distortion is thereby exact in the textures, and good to a fraction of a pixel in the outlines.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A face prepared for shading from one pose: its texture layers as functions of the ray.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws a scene over one exposure of a camera. A software rasteriser finds the visible face of each pixel,
 // then shades exact rays of the real lens model on that face.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two inner loops of the renderer, for runs of pixels of one face. Written with Highway's run-time
 // dispatch; products and sums are rounded one by one on every instruction set, so that a world looks the
 // same, to the byte, on all of them.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The faces that may be seen in one frame, gathered once for all its passes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts light to grey values: automatic exposure, lens fall-off, shot and read noise, tone curve.
 #pragma once
 

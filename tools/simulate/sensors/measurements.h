@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measurements of a simulation's sensors as messages. Times begin at 0 with the simulation.
 #pragma once
 

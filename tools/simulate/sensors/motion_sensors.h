@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // IMU and wheel encoders: measurements of the true motion.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The vehicle's true motion: cubic B-splines of position and of yaw, pitch and roll, so that velocity,
 // acceleration and turn rate follow exactly, at any time.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes a simulation as an LCM log: CALIBRATION and SIMULATION first, then IMU, WHEELS, GROUND_TRUTH and
 // CAMERA_N in order of time.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Streams a simulation in real time: each measurement goes out at its due time.
 //
 // Moment t of the simulation is due at start + t / pace, of CLOCK_MONOTONIC. The due time, not the time of

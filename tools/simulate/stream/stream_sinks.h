@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sinks of a streamed simulation. Messages carry their due times, of CLOCK_MONOTONIC.
 #pragma once
 

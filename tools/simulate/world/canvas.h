@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A drawing surface for textures, in metres: everything wraps around at its edges.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surfaces of the simulated world: textures painted from the seed, and the materials made of them.
 #pragma once
 

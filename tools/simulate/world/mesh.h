@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Geometry of the simulated world: flat textured faces, gathered in clusters (one building, one tree) and
 // chunks (one square of the world).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Smooth noise: of the plane for terrain, periodic for textures.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Centre lines of roads in the plane, and distances from them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Props: trees, houses, cars, lamps, signs. Each becomes clusters of a mesh; places are in
 // the mesh's own axes, on the ground.
 #pragma once

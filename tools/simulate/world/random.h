@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Randomness of the simulated world. Everything random is a function of the seed and of a name or place,
 // never of the order in which things are made: a tile of the world looks the same whenever it is built.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Input of the renderer at one time: chunks near the camera, moving objects, light, air and sky.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The builders of the world's parts, and their common data. Each adds what lies within one chunk; a
 // part belongs to the chunk that holds its middle, and looks the same whichever chunks are built and when.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Height and cover of the ground as functions of the place.
 #pragma once
 

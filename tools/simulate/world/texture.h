@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mip-mapped grey textures that repeat in both directions.
 #pragma once
 

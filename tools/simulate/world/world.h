@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A world made from its description and a seed, at any time. Makes ground, houses and trees in chunks around
 // the moving camera.
 #pragma once

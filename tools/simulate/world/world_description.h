@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Content of a world file (config/worlds/*.yaml): plain values with units. README.md in that folder explains
 // each key.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Strict world files (config/worlds/*.yaml): every error names file, line, key and what was expected.
 #pragma once
 

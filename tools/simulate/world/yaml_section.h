@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One map of a YAML file, read key by key with bounds. A key that no call has read is refused.
 #pragma once
 
