@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <random>
 #include <stdexcept>
 
@@ -22,14 +23,20 @@ std::int32_t random_counter() {
   return std::uniform_int_distribution<std::int32_t>(1, kMost)(device);
 }
 
-// 0 where none was kept yet. Throws std::runtime_error where what was kept is no counter.
-std::int32_t kept(const std::string& path) {
+// 0 without a file. Empty for a file that holds no counter.
+std::optional<std::int32_t> kept(const std::string& path) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return 0;
   std::ifstream in(path);
   std::int32_t value = 0;
-  if (!(in >> value) || value < 0) throw std::runtime_error(path + ": expected a number");
+  if (!(in >> value) || value < 0) return std::nullopt;
   return value;
+}
+
+void keep(const std::string& path, std::int32_t value) {
+  ipc::OutputFile file(path);
+  std::fprintf(file.stream(), "%" PRId32 "\n", value);
+  file.close();
 }
 
 }  // namespace
@@ -45,16 +52,16 @@ std::string state_folder(const std::string& key) {
 BootCounter next_boot_counter(const std::string& folder) {
   if (folder.empty()) return {random_counter(), "no folder keeps it"};
   const std::string path = folder + "/boot_counter";
+  const std::optional<std::int32_t> before = kept(path);
+  BootCounter counter;
+  counter.value = !before ? random_counter() : *before == kMost ? 1 : *before + 1;
+  if (!before) counter.problem = path + ": expected a number; replaced with a random one";
   try {
-    const std::int32_t before = kept(path);
-    const std::int32_t next = before == kMost ? 1 : before + 1;
-    ipc::OutputFile file(path);
-    std::fprintf(file.stream(), "%" PRId32 "\n", next);
-    file.close();
-    return {next, {}};
+    keep(path, counter.value);
   } catch (const std::runtime_error& error) {
     return {random_counter(), error.what()};
   }
+  return counter;
 }
 
 std::uint8_t boot_counter_on_can(std::int32_t value) {

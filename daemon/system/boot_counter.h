@@ -15,8 +15,9 @@ struct BootCounter {
   std::int32_t value = 0;  // 1 and up
   std::string problem;     // why it is a random number; empty where it was counted
 };
-// The next number after the one kept in `folder`, and keeps it there. Random where there is no folder, or
-// where it cannot be read or written; then two starts may have the same number, one time in 255 on CAN.
+// Returns the number after the one kept in `folder`, and keeps it there. A damaged file gets a random number,
+// from which later starts count. Random at each start where no folder can be written; then two starts may
+// have the same number, one time in 255 on CAN.
 [[nodiscard]] BootCounter next_boot_counter(const std::string& folder);
 
 // As the bus carries it: 1 to 255, then 1 again.

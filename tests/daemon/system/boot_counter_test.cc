@@ -41,6 +41,15 @@ TEST(BootCounter, WhatIsNoCounterIsNotTakenForOne) {
   EXPECT_NE(next_boot_counter(scratch.path(".")).problem, "");
 }
 
+TEST(BootCounter, AfterADamagedFileLaterStartsCountOn) {
+  const test::Scratch scratch;
+  std::ofstream(scratch.path("boot_counter")) << "damaged";
+  const BootCounter first = next_boot_counter(scratch.path("."));
+  const BootCounter second = next_boot_counter(scratch.path("."));
+  EXPECT_EQ(second.value, first.value + 1);
+  EXPECT_EQ(second.problem, "");
+}
+
 TEST(BootCounter, AfterTheLastNumberComesTheFirst) {
   const test::Scratch scratch;
   std::ofstream(scratch.path("boot_counter")) << std::numeric_limits<std::int32_t>::max();
