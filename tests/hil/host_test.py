@@ -6,6 +6,7 @@ The bench's checks on the host find what they are there to find: each on good da
 machine is started. And every scenario can be read.
 """
 
+import collections
 import math
 import pathlib
 import struct
@@ -16,7 +17,7 @@ import unittest
 
 ROOT = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.path.insert(0, str(ROOT / "tools/hil"))
-from host import can_bus, checks, lcm_log, scenario  # noqa: E402
+from host import can_bus, checks, consumer, lcm_log, scenario  # noqa: E402
 
 RATE_HZ, PERIOD_US = 50.0, 100_000
 CLOCKS_US = (1_000_000, 5_000_000)  # monotonic and real time at the same moment
@@ -126,6 +127,76 @@ class Bus(unittest.TestCase):
         def never(epoch, frames):
             return {i: frame(i, c, 0.03 + 0.02 * (epoch % 5), False) for i, c in due(epoch)}
         self.assertRegex(self.complaint(never), "only 0 epochs with a valid pose")
+
+
+def with_signals(frames, **signals):
+    """The frames with other raw numbers in these signals."""
+    changed = {}
+    for identifier, data in frames.items():
+        for name, number in signals.items():
+            if name in LAYOUT[identifier].signals:
+                data = put(data, LAYOUT[identifier], name, number)
+        changed[identifier] = can_bus.seal(LAYOUT[identifier], bytearray(data))
+    return changed
+
+
+class Trust(unittest.TestCase):
+    """Epochs come from 6.03 s on; an end is at 7 s, the next start at 7.2 s."""
+
+    EVENTS = {"stopped": [[7.0]], "silent": [[7.0, 7.2]], "started": [[7.2]]}
+
+    @staticmethod
+    def life(frames, now_s):
+        """A first process, an end that says so, a second process."""
+        if now_s > 7.2:
+            return with_signals(frames, BootCounter=2, PositionX=5000)
+        if now_s > 6.97:
+            return with_signals(frames, BootCounter=1, PoseValid=0, State=8) if now_s < 7.0 else {}
+        return with_signals(frames, BootCounter=1)
+
+    def complaint(self, change=lambda frames, now_s: frames, **events):
+        stamps_us = [2_000_000 + PERIOD_US * i for i in range(21)]
+
+        def spoil(epoch, frames):
+            now_s = 6.03 + 0.02 * epoch
+            return change(self.life(frames, now_s), now_s)
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "bus.log"
+            bus_log(path, stamps_us, spoil)
+            happened = collections.defaultdict(list, self.EVENTS | events)
+            return consumer.judge(LAYOUT, path, [1e-6 * stamp + 4.0 for stamp in stamps_us], happened)[0]
+
+    @staticmethod
+    def between(begin_s, end_s, **signals):
+        return lambda frames, now_s: with_signals(frames, **signals) if begin_s < now_s < end_s else frames
+
+    def test_good(self):
+        self.assertIsNone(self.complaint())
+
+    def test_older_than_it_says(self):
+        self.assertRegex(self.complaint(self.between(6.4, 6.5, Age=20)), "the age is wrong at 6.4")
+
+    def test_another_origin(self):
+        self.assertRegex(self.complaint(self.between(7.2, 9.0, BootCounter=1)), "another origin unnoticed at 7.2")
+        self.assertRegex(self.complaint(self.between(6.5, 6.97, PositionX=5000)), "another origin unnoticed at 6.5")
+        self.assertIsNone(self.complaint(self.between(6.5, 6.97, PositionX=5000, ResetCounter=1)))
+
+    def test_a_pose_without_images(self):
+        self.assertRegex(self.complaint(blind=[[6.3, 6.9]]), "a valid pose at 6.6")
+        self.assertIsNone(self.complaint(self.between(6.6, 6.97, PoseValid=0), blind=[[6.3, 6.9]]))
+
+    def test_the_end_says_so(self):
+        self.assertRegex(self.complaint(self.between(6.97, 7.0, State=3)), "the last epoch before the end .* has state 3")
+
+    def test_a_start_counts(self):
+        self.assertRegex(self.complaint(self.between(7.2, 9.0, BootCounter=3)), "boot counter 3 after the start")
+
+    def test_silence(self):
+        self.assertRegex(self.complaint(silent=[[6.5, 7.2]]), "an epoch at 6.6.*where no daemon runs")
+        gap = lambda frames, now_s: {} if 6.5 < now_s < 6.7 else frames  # noqa: E731
+        self.assertRegex(self.complaint(gap), "no epoch for 0.2")
+        self.assertIsNone(self.complaint(gap, held=[[6.5, 6.7]]))
 
 
 class Images(unittest.TestCase):

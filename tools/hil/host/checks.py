@@ -8,7 +8,7 @@ import re
 import struct
 import typing
 
-from host import can_bus, lcm_log
+from host import can_bus, consumer, lcm_log
 from host.material import NotMade, run as run_program
 
 FRAME_BYTES = 320 * 240
@@ -240,6 +240,14 @@ def bus(folder, stock, log, of, rate_hz, *expectations):
     return receiver.check(folder / log, [stamp for _, stamp in frames], clocks, float(rate_hz), expectations)
 
 
+def trust(folder, stock, log, of, happened):
+    """A consumer that keeps to the DBC takes no pose that is older than it says, or of another origin unnoticed."""
+    text = (stock.here.parents[1] / "config/farpoint.dbc").read_text()
+    (monotonic_us, real_us), frames = played(folder / of)
+    stamps_s = [1e-6 * (stamp - monotonic_us + real_us) for _, stamp in frames]
+    return consumer.judge(can_bus.layout(text), folder / log, stamps_s, consumer.events(folder / happened))
+
+
 def axles(path):
     """[(time in s, speeds of the four wheels in m/s)] of what a bus carried: how tools/hil/scenarios/wheels.sh lays it."""
     front, found = (), []
@@ -377,7 +385,7 @@ def quiet(folder, stock, prefix, least, *threads):
 
 
 CHECKS = {"images": images, "bars": bars, "lockstep": lockstep, "schedule": schedule, "bus": bus, "status": status,
-          "wheels": wheels, "quiet": quiet, "wired": wired, "streamed": streamed}
+          "wheels": wheels, "quiet": quiet, "wired": wired, "streamed": streamed, "trust": trust}
 
 
 def run(check, folder, stock):
