@@ -10,6 +10,7 @@
 
 #include "slam/geometry/polynomial.h"
 #include "slam/geometry/random.h"
+#include "slam/geometry/robust.h"
 
 namespace farpoint::slam {
 
@@ -18,10 +19,8 @@ namespace {
 using Bearings = std::span<const Eigen::Vector3d>;
 using Points = std::span<const Eigen::Vector3d>;
 
-constexpr double kChi2_2Dof = 9.21;  // 99 %
 constexpr double kMissChance = 1e-3;
 constexpr int kMinSamples = 30;
-constexpr double kHuber = 1.345;
 // Limits in sigma within which matches take part, round by round: wide first, so that the sample's own choice
 // of matches does not hold the pose where it is.
 constexpr std::array<double, 5> kLimits_sigma = {8.0, 5.0, 3.0, 3.0, 3.0};
@@ -74,17 +73,13 @@ double bearing_error2_rad2(const Eigen::Matrix3d& r, const Eigen::Vector3d& t, c
   return (bearing - (r * point_w + t).normalized()).squaredNorm();
 }
 
-double huber_cost(double r2) {
-  const double r = std::sqrt(r2);
-  return r <= kHuber ? r2 : kHuber * (2.0 * r - kHuber);
-}
-
 double pose_cost(Bearings bearings, Points points, std::span<const size_t> use, double sigma_rad,
                  const SE3& pose) {
   const Eigen::Matrix3d r = pose.rotation();
   double cost = 0.0;
   for (const size_t i : use) {
-    cost += huber_cost(bearing_error2_rad2(r, pose.t, bearings[i], points[i]) / (sigma_rad * sigma_rad));
+    const double squared = bearing_error2_rad2(r, pose.t, bearings[i], points[i]) / (sigma_rad * sigma_rad);
+    cost += 2.0 * huber_cost(squared, kHuberDeltaOneDof);
   }
   return cost;
 }
@@ -104,7 +99,7 @@ void pose_normal_equations(Bearings bearings, Points points, std::span<const siz
     Eigen::Matrix<double, 3, 6> j;
     j << d_direction, -d_direction * skew(points[i]);
     const double chi = error.norm() / sigma_rad;
-    const double w = (chi <= kHuber ? 1.0 : kHuber / chi) / (sigma_rad * sigma_rad);
+    const double w = (chi <= kHuberDeltaOneDof ? 1.0 : kHuberDeltaOneDof / chi) / (sigma_rad * sigma_rad);
     h->noalias() += w * j.transpose() * j;
     g->noalias() += w * j.transpose() * error;
   }
@@ -147,7 +142,7 @@ double truncated_cost(Bearings bearings, Points points, double sigma_rad, const 
   const double scale = 1.0 / (sigma_rad * sigma_rad);
   double cost = 0.0;
   for (size_t i = 0; i < bearings.size() && cost < enough; ++i) {
-    cost += std::min(kChi2_2Dof, scale * bearing_error2_rad2(r, pose.t, bearings[i], points[i]));
+    cost += std::min(kChi2TwoDof99, scale * bearing_error2_rad2(r, pose.t, bearings[i], points[i]));
   }
   return cost;
 }
@@ -159,7 +154,7 @@ size_t find_inliers(Bearings bearings, Points points, double sigma_rad, const SE
   size_t count = 0;
   for (size_t i = 0; i < bearings.size(); ++i) {
     const double r2 = bearing_error2_rad2(r, pose.t, bearings[i], points[i]);
-    const bool inlier = r2 < kChi2_2Dof * sigma_rad * sigma_rad;
+    const bool inlier = r2 < kChi2TwoDof99 * sigma_rad * sigma_rad;
     if (mask != nullptr) (*mask)[i] = inlier ? 1 : 0;
     count += inlier ? 1U : 0U;
   }

@@ -11,17 +11,13 @@
 #include "slam/geometry/five_point.h"
 #include "slam/geometry/random.h"
 #include "slam/geometry/relative_motion.h"
+#include "slam/geometry/robust.h"
 #include "slam/geometry/triangulation.h"
 
 namespace farpoint::slam {
 
 namespace {
 
-// Chi-square limits of an inlier, 99 %, for 1 and 2 degrees of freedom.
-constexpr double kChi2_1Dof = 6.63;
-constexpr double kChi2_2Dof = 9.21;
-// Median of a chi-square variable with 1 degree of freedom.
-constexpr double kChi2Median_1Dof = 0.455;
 // Chance that RANSAC may miss every clean sample.
 constexpr double kMissChance = 1e-3;
 // Sampled by every model whatever the inlier share: minimal samples of noisy matches differ in quality.
@@ -190,16 +186,16 @@ RotationFit find_rotation(const Problem& p) {
     if (std::abs(parallax_angle(s1[0], s1[1]) - parallax_angle(s2[0], s2[1])) > 6.0 * p.sigma_rad) continue;
     const Eigen::Matrix3d r = fit_rotation(s1, s2, all_of<kSample>());
     const TransferKernel kernel{r.cast<float>()};
-    const float cost = p.columns.cost(kernel, p.limit2(kChi2_2Dof), best_cost);
+    const float cost = p.columns.cost(kernel, p.limit2(kChi2TwoDof99), best_cost);
     if (cost >= best_cost) continue;
     best_cost = cost;
     best.R_2_1 = r;
-    samples = needed_samples(p.share(kernel, kChi2_2Dof), kSample, p.options.max_samples);
+    samples = needed_samples(p.share(kernel, kChi2TwoDof99), kSample, p.options.max_samples);
   }
-  std::vector<uint8_t> mask = rotation_inliers(p, best.R_2_1, kChi2_2Dof);
+  std::vector<uint8_t> mask = rotation_inliers(p, best.R_2_1, kChi2TwoDof99);
   for (int round = 0; round < 3 && count_set(mask) >= kSample; ++round) {
     best.R_2_1 = fit_rotation(p.b1, p.b2, mask);
-    mask = rotation_inliers(p, best.R_2_1, kChi2_2Dof);
+    mask = rotation_inliers(p, best.R_2_1, kChi2TwoDof99);
   }
   best.inliers = count_set(mask);
   return best;
@@ -229,19 +225,19 @@ HomographyFit find_homography(const Problem& p) {
     for (size_t i = 0; i < kSample; ++i) forward = forward && s2[i].dot(h * s1[i]) > 0.0;
     if (!forward) continue;
     const TransferKernel kernel{h.cast<float>()};
-    const float cost = p.columns.cost(kernel, p.limit2(kChi2_2Dof), best_cost);
+    const float cost = p.columns.cost(kernel, p.limit2(kChi2TwoDof99), best_cost);
     if (cost >= best_cost) continue;
     best_cost = cost;
     best.found = true;
     best.h = h;
-    samples = needed_samples(p.share(kernel, kChi2_2Dof), kSample, p.options.max_samples);
+    samples = needed_samples(p.share(kernel, kChi2TwoDof99), kSample, p.options.max_samples);
   }
   if (!best.found) return best;
   best.h = refine_homography(p.b1, p.b2, p.sigma_rad, best.h);
   best.chi2.resize(p.size());
   for (size_t i = 0; i < p.size(); ++i) {
     best.chi2[i] = homography_residual2_rad2(best.h, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
-    best.inliers += best.chi2[i] < kChi2_2Dof ? 1U : 0U;
+    best.inliers += best.chi2[i] < kChi2TwoDof99 ? 1U : 0U;
   }
   return best;
 }
@@ -287,12 +283,12 @@ std::vector<EssentialHypothesis> find_essentials(const Problem& p) {
       const EssentialKernel kernel{candidates.matrix[i].cast<float>()};
       const float enough =
           kept.size() < kMaxHypotheses ? std::numeric_limits<float>::max() : kept.back().cost;
-      const float cost = p.columns.cost(kernel, p.limit2(kChi2_1Dof), enough);
+      const float cost = p.columns.cost(kernel, p.limit2(kChi2OneDof99), enough);
       if (cost >= enough) continue;
       keep({cost, candidates.matrix[i]}, &kept);
       if (cost >= best_cost) continue;
       best_cost = cost;
-      samples = needed_samples(p.share(kernel, kChi2_1Dof), kSample, p.options.max_samples);
+      samples = needed_samples(p.share(kernel, kChi2OneDof99), kSample, p.options.max_samples);
     }
   }
   return kept;
@@ -334,7 +330,7 @@ MatchGeometry match_geometry(const SE3& T_2_1, const Eigen::Vector3d& b1, const 
 }
 
 bool is_inlier(const MatchGeometry& m) {
-  return m.supported && m.chi2 < kChi2_1Dof && m.side != Side::kBehind;
+  return m.supported && m.chi2 < kChi2OneDof99 && m.side != Side::kBehind;
 }
 
 struct Candidate {
@@ -346,9 +342,9 @@ struct Candidate {
 // Truncated chi-square of a match's epipolar residual; a point behind a view costs as much as an outlier.
 double match_cost(const Problem& p, const SE3& T_2_1, size_t i) {
   const double chi2 = epipolar_residual2_rad2(T_2_1, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
-  if (chi2 >= kChi2_1Dof) return kChi2_1Dof;
+  if (chi2 >= kChi2OneDof99) return kChi2OneDof99;
   const bool behind = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad).side == Side::kBehind;
-  return behind ? kChi2_1Dof : chi2;
+  return behind ? kChi2OneDof99 : chi2;
 }
 
 double motion_cost(const Problem& p, const SE3& T_2_1) {
@@ -429,7 +425,7 @@ std::vector<Candidate> refined_candidates(const Problem& p, std::vector<Candidat
 bool plane_is_better(const HomographyFit& plane, const std::vector<MatchGeometry>& general) {
   double cost_plane = 0.0, cost_general = 0.0, n = 0.0;
   for (size_t i = 0; i < general.size(); ++i) {
-    if (plane.chi2[i] >= kChi2_2Dof && general[i].chi2 >= kChi2_1Dof) continue;
+    if (plane.chi2[i] >= kChi2TwoDof99 && general[i].chi2 >= kChi2OneDof99) continue;
     cost_plane += std::min(plane.chi2[i], 4.0) + 2.0 * std::log(4.0);
     cost_general += std::min(general[i].chi2, 2.0) + 3.0 * std::log(4.0);
     n += 1.0;
@@ -449,13 +445,13 @@ double observed_variance(const std::vector<MatchGeometry>& geometry) {
   if (chi2.empty()) return 1.0;
   const auto middle = chi2.begin() + static_cast<std::ptrdiff_t>(chi2.size() / 2);
   std::nth_element(chi2.begin(), middle, chi2.end());
-  return std::max(1.0, *middle / kChi2Median_1Dof);
+  return std::max(1.0, *middle / kChi2OneDof50);
 }
 
 std::vector<MatchGeometry> all_geometry(const Problem& p, const SE3& T_2_1) {
   std::vector<MatchGeometry> geometry(p.size());
   const std::vector<uint8_t> supported =
-      supported_matches(p.b1, p.b2, T_2_1, std::sqrt(kChi2_1Dof) * p.sigma_rad);
+      supported_matches(p.b1, p.b2, T_2_1, std::sqrt(kChi2OneDof99) * p.sigma_rad);
   for (size_t i = 0; i < p.size(); ++i) {
     geometry[i] = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad);
     geometry[i].supported = supported[i] != 0;
@@ -487,7 +483,7 @@ void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewRes
   result->status = TwoViewStatus::kNoParallax;
   result->model = TwoViewModel::kNone;
   result->T_2_1 = {Eigen::Quaterniond(rotation.R_2_1).normalized(), Eigen::Vector3d::Zero()};
-  result->inlier = rotation_inliers(p, rotation.R_2_1, kChi2_2Dof);
+  result->inlier = rotation_inliers(p, rotation.R_2_1, kChi2TwoDof99);
   result->inliers = rotation.inliers;
   result->valid_depths = 0;
   result->median_parallax_rad = 0.0;
@@ -500,7 +496,7 @@ void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewRes
 // Share of the matches that the motion explains and the rotation does not, at the noise as it turned out.
 double unexplained_share(const Problem& p, const RotationFit& rotation,
                          const std::vector<MatchGeometry>& geometry) {
-  const double limit = kChi2_2Dof * observed_variance(geometry) * p.sigma_rad * p.sigma_rad;
+  const double limit = kChi2TwoDof99 * observed_variance(geometry) * p.sigma_rad * p.sigma_rad;
   size_t explained = 0, unexplained = 0;
   for (size_t i = 0; i < p.size(); ++i) {
     if (!is_inlier(geometry[i])) continue;
