@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/geometry/robust.h"
 #include "slam/geometry/triangulation.h"
 #include "slam/map/predict.h"
 #include "slam/mapping/measurement.h"
@@ -12,7 +13,6 @@ namespace farpoint::slam {
 
 namespace {
 
-constexpr double kChi2TwoDof = 5.99;
 // Depth of the nearest points searched for, as a share of the depth that nine tenths of what the keyframe
 // sees lie beyond: nearer ones leave the image before they are of use. (Of a median, a map of distant
 // landmarks would put the limit so far out that the near ones, which hold the translation, were no longer
