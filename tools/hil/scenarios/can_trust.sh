@@ -6,6 +6,7 @@
 #@ broken_says: ^the age is wrong
 clock() { date +%s.%N; }
 note() { echo "$*" >> /tmp/events; }
+later() { echo "$1 $2" | awk '{printf "%.6f", $1 + $2}'; }
 tracks_again() { wait_until 20 "tracking after $1" said_times "-> tracking" "$2"; }
 launch() {
   start_daemon --set can.enabled=true --set can.interface=vcan0 --set can.rate_hz=50 --set scale.assumed=1 \
@@ -19,13 +20,13 @@ launch_again() {
   tracks_again "the restart" 1
   sleep 1
 }
-# hold THREAD: for a second. Mapping does not keep tracking from its poses.
+# hold THREAD: for a second and what it takes to let go. Mapping does not keep tracking from its poses.
 hold() {
   local from so_far
   so_far=$(said "-> tracking")
   from=$(clock)
   /tmp/stop_thread $daemon "$1" 1 || fail "$1 cannot be held"
-  [ "$1" = fp-mapping ] || note blind "$from" "$(clock)"
+  [ "$1" = fp-mapping ] || note blind "$from" "$(later "$from" 1)"
   [ "$1" != fp-output ] || note held "$from" "$(clock)"
   sleep 1.5
   figure "$1 held: $(($(said "-> tracking") - so_far)) times tracking anew"
