@@ -2,7 +2,7 @@
 # A receiver that keeps to the DBC is never deceived: start, gap, each thread held, orderly end, kill, restarts.
 #@ form: long
 #@ check: trust can.log played events
-#@ broken: epochs of before the kill come once more after the restart
+#@ broken: epochs of before the kill come once more after the restart, half a period of images out of step
 #@ broken_says: ^the age is wrong
 clock() { date +%s.%N; }
 note() { echo "$*" >> /tmp/events; }
@@ -65,7 +65,7 @@ kill $player
 if [ -n "$BROKEN" ]; then
   killed=$(sed -n 's/^silent \([0-9.]*\) .*/\1/p' /tmp/events | tail -1)
   awk -v killed="$killed" '{ at = substr($1, 2, length($1) - 2) + 0 }
-    at > killed - 0.5 && at < killed - 0.2 { printf "(%.6f) %s %s\n", at + 3, $2, $3 }' /tmp/can.log > /tmp/stale
+    at > killed - 0.5 && at < killed - 0.2 { printf "(%.6f) %s %s\n", at + 3.05, $2, $3 }' /tmp/can.log > /tmp/stale
   sort /tmp/can.log /tmp/stale -o /tmp/can.log
 fi
 cp -t "$left" /tmp/played /tmp/can.log /tmp/events
