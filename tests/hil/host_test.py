@@ -141,13 +141,13 @@ def with_signals(frames, **signals):
 
 
 class Trust(unittest.TestCase):
-    """Epochs come from 6.03 s on; an end is at 7 s, the next start at 7.2 s."""
+    """Epochs come from 6.03 s on. A process ends at 7 s, the next starts at 7.2 s."""
 
     EVENTS = {"stopped": [[7.0]], "silent": [[7.0, 7.2]], "started": [[7.2]]}
 
     @staticmethod
     def life(frames, now_s):
-        """A first process, an end that says so, a second process."""
+        """A first process, its stated end, a second process."""
         if now_s > 7.2:
             return with_signals(frames, BootCounter=2, PositionX=5000)
         if now_s > 6.97:
@@ -186,7 +186,7 @@ class Trust(unittest.TestCase):
         self.assertRegex(self.complaint(blind=[[6.3, 6.9]]), "a valid pose at 6.6")
         self.assertIsNone(self.complaint(self.between(6.6, 6.97, PoseValid=0), blind=[[6.3, 6.9]]))
 
-    def test_the_end_says_so(self):
+    def test_an_end_is_stated(self):
         self.assertRegex(self.complaint(self.between(6.97, 7.0, State=3)), "the last epoch before the end .* has state 3")
 
     def test_a_start_counts(self):
