@@ -71,7 +71,7 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
 int replay_in_order(const Options& options, const Config& config, Schedule* schedule) {
   const StopOnSignal stop;
   LogFrameSource source(options.replay, config.camera.index);
-  Outputs outputs(options, config, Outputs::Use::kReplay, schedule != nullptr ? schedule->boot_counter() : 0);
+  Outputs outputs(options, config, schedule != nullptr ? schedule->boot_counter() : 0);
   std::unique_ptr<Session> session;
   std::optional<MeasurementFeed> feed;
   std::vector<double> cpu_ms;  // of decoding and tracking, a frame
@@ -119,10 +119,12 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   PipelineOptions pipeline_options;
   pipeline_options.width_px = first.image->width_px;
   pipeline_options.height_px = first.image->height_px;
-  pipeline_options.realtime = &realtime;
-  Pipeline pipeline(config, pipeline_options, &paced, session.get(), &outputs);
+  const PipelineParts parts{&paced,   &session->estimator(), &session->reporter(),
+                            &outputs, &session->tally(),     &realtime};
+  Pipeline pipeline(config, pipeline_options, parts);
   ThreadHooks all_hooks = hooks;
   all_hooks.on_started = [&] { realtime.print(); };
+  outputs.start_writing(config.realtime, &realtime);
   pipeline.run(all_hooks);
   return conclude(options, source, pipeline.frames_dropped(), pipeline.take_tracking_cpu_ms(), session.get(),
                   &outputs);

@@ -116,6 +116,12 @@ struct RealtimeConfig {
   double deadline_ms = 0;   // mid-exposure to output; 0: live a frame period, in replay none
   int cpu_latency_us = -1;  // live; -1: unchanged
   bool require = false;     // exit if the system refuses one of these
+  int disk_ring_mb = 8;     // what may wait for a slow disk
+};
+
+// Live: longest time without progress of a thread that has work, before the watchdog is no longer fed.
+struct WatchdogConfig {
+  double capture_s = 0.5, tracking_s = 0.5, mapping_s = 2.0, output_s = 0.5;
 };
 
 struct Config {
@@ -127,6 +133,7 @@ struct Config {
   LcmConfig lcm;
   CanConfig can;
   RealtimeConfig realtime;
+  WatchdogConfig watchdog;
   slam::EstimatorConfig estimator;
 };
 

@@ -150,6 +150,12 @@ std::vector<ConfigKey> make_keys() {
       number("realtime.deadline_ms", "ms", 0, 100000, FIELD(realtime.deadline_ms)),
       integer("realtime.cpu_latency_us", "us", -1, 1000000, FIELD(realtime.cpu_latency_us)),
       boolean("realtime.require", FIELD(realtime.require)),
+      integer("realtime.disk_ring_mb", "MB", 1, 1000, FIELD(realtime.disk_ring_mb)),
+
+      number("watchdog.capture_s", "s", 0.2, 60, FIELD(watchdog.capture_s)),
+      number("watchdog.tracking_s", "s", 0.05, 60, FIELD(watchdog.tracking_s)),
+      number("watchdog.mapping_s", "s", 0.05, 60, FIELD(watchdog.mapping_s)),
+      number("watchdog.output_s", "s", 0.05, 60, FIELD(watchdog.output_s)),
 
       integer("pyramid.levels", "levels", 1, 16, FIELD(estimator.pyramid.levels)),
       number("pyramid.scale_factor", "", 1.05, 2, FIELD(estimator.pyramid.scale_factor)),

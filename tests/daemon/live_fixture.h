@@ -104,6 +104,7 @@ class LiveRunTest : public testing::Test {
         silent_.push_back(f);
       } else {
         last_seen_ = f;
+        last_seen_state_ = f.result.state;
         ++frames_;
       }
     };
@@ -153,8 +154,9 @@ class LiveRunTest : public testing::Test {
   ThreadHooks hooks_;
   std::unique_ptr<FilmCamera> camera_ = std::make_unique<FilmCamera>(), second_camera_;
   std::atomic<int> frames_{0};
-  FrameOutput last_seen_;            // output's thread, read after the run
-  std::vector<FrameOutput> silent_;  // the same
+  FrameOutput last_seen_;  // output's thread, read after the run
+  std::atomic<slam::State> last_seen_state_{slam::State::kStarting};
+  std::vector<FrameOutput> silent_;  // output's thread, read after the run
   double stopped_s_ = 0, stop_took_s_ = 0;
   std::string printed_;
 };

@@ -32,18 +32,17 @@ TEST_F(SessionTest, HandsEachFrameToTheSinksOnceAndInOrder) {
   EXPECT_GT(clock_.wall_ms(timing_t::STAGE_FRAME), 0.0);
 }
 
-TEST_F(SessionTest, TheEndCountsFramesAndKeepsTheTimesOfValidOnes) {
-  for (int i = 0; i < 3; ++i) process(i);
-  slam::FrameResult valid;
-  valid.utime = 5'000'000;
-  session_->remember(valid, true);
-  session_->remember(valid, true, false);
-  session_->remember(valid, false);
+TEST_F(SessionTest, TheEndIsKnownFromTheFramesAlone) {
+  for (int i = 0; i < 30; ++i) process(i);
   const RunEnd& end = session_->end();
-  EXPECT_EQ(end.frames, 6);
-  EXPECT_EQ(end.frames_valid, 2);
-  EXPECT_EQ(end.live_utimes, std::vector<std::int64_t>{5'000'000});
-  EXPECT_EQ(end.utime, 5'000'000);
+  EXPECT_EQ(end.frames, 30);
+  EXPECT_EQ(end.first_utime, 1'000'000);
+  EXPECT_EQ(end.utime, 3'900'000);
+  EXPECT_EQ(end.counts.frames, 30U);
+  EXPECT_EQ(end.counts.maps, 1U);
+  EXPECT_GT(end.initialised_utime, 1'000'000);
+  EXPECT_LT(end.initialised_utime, 3'900'000);
+  EXPECT_EQ(end.live_utimes.size(), static_cast<std::size_t>(end.frames_valid));
 }
 
 TEST_F(SessionTest, FinishPublishesTheRunsResultsWithWhatWasRefused) {
