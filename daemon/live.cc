@@ -19,6 +19,7 @@
 #include "daemon/output/run_summary.h"
 #include "daemon/pipeline/session.h"
 #include "daemon/system/control_socket.h"
+#include "daemon/system/core_plan.h"
 #include "daemon/system/late_opened.h"
 #include "daemon/system/logging.h"
 #include "daemon/system/service_log.h"
@@ -228,7 +229,7 @@ std::unique_ptr<Session> LiveRun::open_session() {
   const std::string second = config_.camera.has_second() ? " and " + config_.camera.second_device : "";
   spdlog::info("farpointd {}, configuration {:016x}, live from {} {}{}", build_text(), config_hash(config_),
                value_text(config_, "camera.driver"), config_.camera.device, second);
-  // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
+  // Memory grows with the way only where its results are asked for: a vehicle drives for hours.
   config_.estimator.capacity.whole_trajectory = wants_results();
   std::unique_ptr<Session> session =
       make_session(config_, calibration_, &outputs_, !options_.output.empty(), wants_results());
@@ -282,7 +283,8 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
   const StopAtEnd stop_recording(this);
   std::optional<Thread> second_capture;
   if (second_)
-    second_capture.emplace(SecondCamera::kThread, config_.realtime, config_.realtime.capture, &realtime_,
+    second_capture.emplace(SecondCamera::kThread, config_.realtime,
+                           resolved(config_.realtime, usable_cores()).capture, &realtime_,
                            [this] { second_->run(); });
   const StopAtEnd stop_second(second_.get());
   std::optional<Thread> wheels;

@@ -39,8 +39,8 @@ std::string stopped_by(int signal, const char* when) {
   return fmt::format("stopped by signal {} {}", signal, when);
 }
 
-// Puts the outputs in their place and prints the last line. Returns the exit status. A replay that a signal
-// stopped ends like one whose log is over, and says so.
+// Closes the outputs and prints the last line. Returns the exit status. A replay stopped by a signal closes
+// its outputs as one at the end of its log does, and prints the signal.
 int conclude(const Options& options, const LogFrameSource& source, std::int64_t frames_dropped,
              std::vector<double> cpu_ms, Session* session, Outputs* outputs) {
   outputs->farewell();

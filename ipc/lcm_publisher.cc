@@ -11,7 +11,7 @@ LcmPublisher::LcmPublisher(const std::string& url, std::size_t buffer_bytes) : b
   const bool is_udp = url.empty() || url.starts_with("udpm://");
   throw std::runtime_error(
       "cannot publish on '" + url + "': " +
-      (is_udp ? "no route to the multicast group (for one host: ip route add 224.0.0.0/4 dev lo)"
+      (is_udp ? "no route to the multicast group (for one host: ip route add 239.255.76.67/32 dev lo)"
               : "expected an LCM URL such as udpm://239.255.76.67:7667?ttl=0"));
 }
 

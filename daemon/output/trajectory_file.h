@@ -50,9 +50,9 @@ class LiveTrajectory final : public PoseSink {
 // "dir/NAME.map2.tum" for dir/NAME.tum and 2.
 [[nodiscard]] std::string trajectory_path(const std::string& path, int map_number);
 
-// The first trajectory to `path` (a file that only says so where there is none), the others to NAME.map2.tum,
-// ...; such files of an earlier run beyond these are removed. Positions times unit_scale. Returns the paths
-// written; throws std::runtime_error.
+// Writes the first trajectory to `path`, the others to NAME.map2.tum and so on. Without any, the file holds a
+// comment only. Removes further such files of an earlier run. Positions are multiplied by unit_scale. Returns
+// the written paths. Throws std::runtime_error.
 std::vector<std::string> write_final_trajectories(const std::string& path,
                                                   const std::vector<slam::MapTrajectory>& trajectories,
                                                   double unit_scale);

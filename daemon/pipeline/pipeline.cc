@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/output/run_summary.h"
+#include "daemon/system/core_plan.h"
 #include "daemon/system/logging.h"
 #include "daemon/system/stop_signal.h"
 
@@ -31,7 +32,7 @@ std::size_t ring_slots(double seconds, double rate_hz) {
 }
 
 Pipeline::Pipeline(const Config& config, const PipelineOptions& options, const PipelineParts& parts)
-    : config_(config.realtime),
+    : config_(resolved(config.realtime, usable_cores())),
       tally_(*parts.tally),
       realtime_(parts.realtime),
       images_(static_cast<std::size_t>(config.realtime.capture_queue), options.width_px, options.height_px),

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The live daemon while one of its threads hangs, or a side function cannot begin.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -199,6 +205,59 @@ TEST_F(SideLiveTest, AnLcmUrlThatCanNeverWorkStopsTheStart) {
               std::string::npos)
         << complaint();
   }
+}
+
+// A pipe that is full and has no reader stands in for a disk that does not answer.
+TEST_F(SideLiveTest, ADiskThatDoesNotAnswerHoldsNeitherTrackingNorTheBus) {
+  options_.output = scratch_.path("disk");
+  options_.can_log = scratch_.path("out.candump");
+  ASSERT_EQ(mkfifo(options_.output.c_str(), 0600), 0);
+  const int disk = open(options_.output.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(disk, 0);
+  ASSERT_GT(fcntl(disk, F_SETPIPE_SZ, 4096), 0);
+  std::thread answer;
+  const double began_s = steady_s();
+  const int status = run([&] {
+    if (frames_ < 60 && steady_s() - began_s < 60.0) return false;
+    // The end of the run needs the disk.
+    answer = std::thread([disk] {
+      ASSERT_EQ(fcntl(disk, F_SETFL, 0), 0);
+      char bytes[4096];
+      while (read(disk, bytes, sizeof bytes) > 0) continue;
+    });
+    return true;
+  });
+  answer.join();
+  close(disk);
+  EXPECT_EQ(status, 0);
+  EXPECT_GE(frames_, 60) << "after a minute";
+  const auto story = test::read_can_story(options_.can_log);
+  ASSERT_GT(story.size(), 100U);
+  double longest_s = 0.0;
+  for (std::size_t i = 1; i + 1 < story.size(); ++i)
+    longest_s = std::max(longest_s, story[i].time_s - story[i - 1].time_s);
+  EXPECT_LT(longest_s, 0.5);  // a shared machine; 20 ms where it is free
+}
+
+TEST_F(SideLiveTest, ARequiredCoreThatIsRefusedEndsTheProcess) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(
+      {
+        alarm(60);  // it would hang
+        config_.realtime.require = true;
+        config_.realtime.tracking.core = 1000;
+        options_.record = scratch_.path("run.lcm");
+        LiveEnvironment environment;
+        environment.camera = std::move(camera_);
+        try {
+          (void)live(options_, config_, {}, std::move(environment));
+        } catch (const std::runtime_error& error) {
+          std::fprintf(stderr, "%s\n", error.what());
+          std::exit(1);
+        }
+        std::exit(0);
+      },
+      testing::ExitedWithCode(1), "is not on core 1000.*realtime.require is set");
 }
 
 // --- what the last line tells

@@ -41,12 +41,12 @@ TEST(ControlSocket, AnswersAndIsForOwnerAndGroup) {
     EXPECT_EQ(status.st_mode & 0777, 0660U);
     EXPECT_EQ(ask_and_serve(&socket, path, "status"), "ok status");
     EXPECT_EQ(ask_and_serve(&socket, path, "again"), "ok again");
-    socket.serve([](const std::string&) -> std::string { throw std::logic_error("nobody asked"); });
+    socket.serve([](const std::string&) -> std::string { throw std::logic_error("no request"); });
   }
   EXPECT_NE(access(path.c_str(), F_OK), 0);  // gone with the daemon
 }
 
-// A socket at this path that answers nobody.
+// A socket at this path without a daemon.
 void leave_socket(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
