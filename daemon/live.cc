@@ -148,9 +148,12 @@ class LiveRun {
   RealtimeReport realtime_;
   Pipeline pipeline_;
   double next_status_s_ = 0;
-  std::int64_t left_out_said_ = 0;
-  slam::State state_said_ = slam::State::kStarting;
-  const char* hung_said_ = nullptr;  // thread
+  // As logged last.
+  struct Logged {
+    std::int64_t left_out = 0;  // of the recording
+    slam::State state = slam::State::kStarting;
+    const char* hung = nullptr;  // thread
+  } logged_;
 };
 
 LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* environment)
@@ -309,20 +312,20 @@ void LiveRun::tick(const std::function<Config()>& reload) {
   if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
   manager_.watch(now_s, [&] { return all_threads_alive(now_s); });
-  if (const slam::State state = pipeline_.state(); state != state_said_) {
-    spdlog::info("{} -> {}", to_string(state_said_), to_string(state));
-    state_said_ = state;
+  if (const slam::State state = pipeline_.state(); state != logged_.state) {
+    spdlog::info("{} -> {}", to_string(logged_.state), to_string(state));
+    logged_.state = state;
   }
   if (now_s >= next_status_s_) tell_status(now_s);
 }
 
 bool LiveRun::all_threads_alive(double now_s) {
   const char* hung = pipeline_.hung_thread(now_s);
-  if (hung != hung_said_ && hung != nullptr)
+  if (hung != logged_.hung && hung != nullptr)
     spdlog::error("{} has finished nothing within its limit (section watchdog): the watchdog is not fed",
                   hung);
-  if (hung != hung_said_ && hung == nullptr) spdlog::warn("{} makes progress again", hung_said_);
-  hung_said_ = hung;
+  if (hung != logged_.hung && hung == nullptr) spdlog::warn("{} makes progress again", logged_.hung);
+  logged_.hung = hung;
   return hung == nullptr;
 }
 
@@ -330,10 +333,10 @@ void LiveRun::tell_status(double now_s) {
   next_status_s_ = now_s + kStatusEvery_s;
   manager_.status(status_text());
   const Recorder* recorder = recorder_.get();
-  if (recorder == nullptr || recorder->left_out() == left_out_said_) return;
-  left_out_said_ = recorder->left_out();
+  if (recorder == nullptr || recorder->left_out() == logged_.left_out) return;
+  logged_.left_out = recorder->left_out();
   spdlog::warn("{}: {} images left out so far: the disk cannot follow, or is full", options_.record,
-               left_out_said_);
+               logged_.left_out);
 }
 
 std::string LiveRun::status_text() const {
@@ -375,16 +378,29 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
 }
 
 int LiveRun::conclude() {
+  outputs_.finish_writing();
   const RunEnd& end = wants_results() ? session_->finish(pipeline_.input()) : session_->end();
-  std::vector<std::string> written = outputs_.close(end);
-  if (Recorder* recorder = recorder_.get()) {
-    recorder->close();
+  // One file that cannot be stored takes no other with it.
+  std::string problems;
+  const auto close = [&problems](const auto& close_files) {
+    try {
+      close_files();
+    } catch (const std::runtime_error& error) {
+      problems += (problems.empty() ? "" : "; ") + std::string(error.what());
+    }
+  };
+  std::vector<std::string> written;
+  close([&] { outputs_.close(end, &written); });
+  close([&] {
+    if (recorder_.get() == nullptr) return;
+    recorder_.get()->close();
     written.push_back(options_.record);
-  }
+  });
   std::fprintf(
       line_stream(options_), "%s\n",
       last_line(end, pipeline_.input(), pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
           .c_str());
+  if (!problems.empty()) throw std::runtime_error(problems);
   return 0;
 }
 

@@ -46,8 +46,10 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
   outputs->farewell();
   const int signal = StopOnSignal::signal();
   if (session == nullptr) throw std::runtime_error(stopped_by(signal, "before the first image"));
+  outputs->finish_writing();
   const RunEnd& end = session->finish(source.counts());
-  const std::vector<std::string> written = outputs->close(end);
+  std::vector<std::string> written;
+  outputs->close(end, &written);
   const ipc::LogDamage& damage = source.damage();
   if (damage.cut_off) {
     std::fprintf(

@@ -23,6 +23,7 @@ bool writes_files(const Options& options) {
 // Closes files, each by itself.
 class Closing {
  public:
+  explicit Closing(std::vector<std::string>* written) : written_(*written) {}
   // close_files returns the paths of what it closed.
   void close(const std::function<std::vector<std::string>()>& close_files) {
     try {
@@ -31,14 +32,12 @@ class Closing {
       problems_ += (problems_.empty() ? "" : "; ") + std::string(error.what());
     }
   }
-  // Throws std::runtime_error with all problems.
-  std::vector<std::string> take() {
+  void throw_problems() const {
     if (!problems_.empty()) throw std::runtime_error(problems_);
-    return std::move(written_);
   }
 
  private:
-  std::vector<std::string> written_;
+  std::vector<std::string>& written_;
   std::string problems_;
 };
 
@@ -122,16 +121,23 @@ void Outputs::farewell() {
   if (bus_) bus_->farewell();
 }
 
-std::vector<std::string> Outputs::close(const RunEnd& end) {
-  farewell();
+void Outputs::finish_writing() {
   if (files_) files_->stop();
-  Closing closing;
+}
+
+void Outputs::close(const RunEnd& end, std::vector<std::string>* written) {
+  farewell();
+  finish_writing();
+  Closing closing(written);
   closing.close([this] { return close_log(); });
   closing.close([&] { return write_trajectories(end); });
   closing.close([this] { return close_live_trajectory(); });
   closing.close([this] { return close_buses(); });
-  warn_of_losses();
-  return closing.take();
+  closing.close([this]() -> Paths {
+    warn_of_losses();
+    return {};
+  });
+  closing.throw_problems();
 }
 
 Outputs::Paths Outputs::close_log() {

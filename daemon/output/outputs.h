@@ -55,10 +55,14 @@ class Outputs {
   void start_writing(const RealtimeConfig& config, RealtimeReport* report);
   // Calling thread, after the output thread has ended: the bus gets its last epoch.
   void farewell();
+  // Calling thread, after that: waits until the files hold what was published. Results that follow are
+  // written at once.
+  void finish_writing();
 
-  // Renames every file to its final name, each by itself; returns the names. Throws std::runtime_error where
-  // something was not stored, after all others are closed. Warns of what was not sent.
-  std::vector<std::string> close(const RunEnd& end);
+  // Renames every file to its final name, each by itself, and appends the names to *written. Throws
+  // std::runtime_error where something was not stored, after all others are closed. Warns of what was not
+  // sent.
+  void close(const RunEnd& end, std::vector<std::string>* written);
 
  private:
   using Paths = std::vector<std::string>;

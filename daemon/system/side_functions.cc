@@ -19,9 +19,7 @@ std::string SideFunctions::attempt(const Begin& begin) {
   try {
     begin();
     return {};
-  } catch (const ConfigError&) {
-    throw;
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     failures_.fetch_add(1, std::memory_order_relaxed);
     const std::string reason = error.what();
     return reason.empty() ? "unknown reason" : reason;

@@ -30,7 +30,7 @@ class SideFunctions {
  public:
   static constexpr const char* kThread = "fp-retry";
   static constexpr std::int64_t kRetryEvery_us = 1'000'000;
-  // Throws std::runtime_error with the reason where the function cannot begin now.
+  // Throws std::exception with the reason where the function cannot begin now.
   using Begin = std::function<void()>;
 
   SideFunctions() = default;
@@ -39,8 +39,7 @@ class SideFunctions {
   SideFunctions(const SideFunctions&) = delete;
   SideFunctions& operator=(const SideFunctions&) = delete;
 
-  // Before start(). Begins the function at once; a failure is logged and left to the thread. A ConfigError
-  // passes through: trying again would not help.
+  // Before start(). Begins the function at once; a failure is logged and left to the thread.
   void begin(SideFunction which, const std::string& what, Begin begin);
   // Starts the thread where a function is missing. `report` may be null.
   void start(const RealtimeConfig& config, RealtimeReport* report);

@@ -44,12 +44,6 @@ TEST(SideFunctions, OneThatCannotBeginIsMissingAndTriedAgainUntilItCan) {
   EXPECT_EQ(attempts, 3) << "no attempt after the one that worked";
 }
 
-TEST(SideFunctions, AMistakeOfTheConfigurationPassesThrough) {
-  SideFunctions side;
-  EXPECT_THROW(side.begin(SideFunction::kLcm, "LCM", [] { throw ConfigError("lcm.url: what?"); }),
-               ConfigError);
-}
-
 TEST(SideFunctions, ItsThreadTriesAndStopsAtOnce) {
   SideFunctions side;
   std::atomic<int> attempts{0};
