@@ -107,7 +107,9 @@ TEST_F(HeldLiveTest, AHungMappingStopsTheFeedingAndTheBusGoesOnWithTheTruth) {
   const auto epochs = epochs_while_held(0.0);
   EXPECT_GE(epochs.size(), 20U);
   for (const test::CanEpoch& epoch : epochs) {
-    if (epoch.valid != 0.0) EXPECT_LE(epoch.age_s, 0.2501);
+    if (epoch.valid != 0.0) {
+      EXPECT_LE(epoch.age_s, 0.2501);
+    }
   }
 }
 
@@ -121,7 +123,9 @@ TEST_F(HeldLiveTest, AHungOutputStopsTheFeedingAndTheBusIsSilent) {
   expect_hang_was_found();
   EXPECT_TRUE(epochs_while_held(0.0).empty());
   for (const test::CanEpoch& epoch : test::read_can_story(options_.can_log)) {
-    if (epoch.valid != 0.0) EXPECT_LE(epoch.age_s, 0.2501);
+    if (epoch.valid != 0.0) {
+      EXPECT_LE(epoch.age_s, 0.2501);
+    }
   }
 }
 

@@ -152,7 +152,9 @@ TEST(DroppedKeys, NoneIsAKeyOfThisVersionAndEachHeirIs) {
   for (const ConfigKey& key : config_keys()) names.insert(key.name);
   for (const DroppedKey& key : dropped_keys()) {
     EXPECT_FALSE(names.contains(key.name)) << key.name;
-    if (!key.heir.empty()) EXPECT_TRUE(names.contains(key.heir)) << key.heir;
+    if (!key.heir.empty()) {
+      EXPECT_TRUE(names.contains(key.heir)) << key.heir;
+    }
   }
 }
 

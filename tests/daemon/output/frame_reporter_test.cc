@@ -117,7 +117,8 @@ TEST_F(FrameReporterTest, TheStatusHasTheCountsOfTheOutputs) {
   EXPECT_EQ(status[0].can_send_errors, 2);
   EXPECT_EQ(status[0].can_received, 3);
   EXPECT_EQ(status[0].log_write_errors, 4);
-  EXPECT_EQ(status[0].side_missing, status_t::SIDE_RECORDING | status_t::SIDE_LCM);
+  EXPECT_EQ(status[0].side_missing,
+            std::int32_t{status_t::SIDE_RECORDING} + std::int32_t{status_t::SIDE_LCM});
   EXPECT_EQ(status[0].side_failures, 6);
 }
 
