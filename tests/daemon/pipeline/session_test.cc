@@ -68,11 +68,11 @@ TEST_F(SessionTest, TheMapIsPublishedWithAFrameThatHasTakenIt) {
 }
 
 TEST_F(SessionTest, FinishPublishesTheRunsResultsWithWhatWasRefused) {
-  for (int i = 0; i < 30; ++i) process(i);
+  for (int i = 0; i < 80; ++i) process(i);
   InputCounts in;
   in.times_backwards = 4, in.undecodable = 5;
   const RunEnd& end = session_->finish(in);
-  EXPECT_EQ(end.counts.frames, 30U);
+  EXPECT_EQ(end.counts.frames, 80U);
   EXPECT_GT(end.counts.mapping.keyframes_made, 1U);
   EXPECT_EQ(end.landmarks.size(), end.counts.landmarks);
   EXPECT_EQ(kept_.of<trajectory_t>(ipc::kTrajectoryChannel).size(), 1U);
