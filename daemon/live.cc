@@ -19,8 +19,12 @@
 #include "daemon/output/run_summary.h"
 #include "daemon/pipeline/session.h"
 #include "daemon/system/control_socket.h"
+#include "daemon/system/core_plan.h"
+#include "daemon/system/late_opened.h"
 #include "daemon/system/logging.h"
+#include "daemon/system/service_log.h"
 #include "daemon/system/service_manager.h"
+#include "daemon/system/side_functions.h"
 #include "daemon/system/stop_signal.h"
 
 namespace farpoint::daemon {
@@ -81,11 +85,11 @@ void say(const drivers::CameraEvent& event, const std::string& device) {
   }
 }
 
-// Tells what runs on a thread of its own to stop, when the scope ends.
+// Stops what runs on a thread of its own, when the scope ends.
 template <typename Runner>
 class StopAtEnd {
  public:
-  explicit StopAtEnd(Runner* runner) : runner_(runner) {}  // null: nothing runs
+  explicit StopAtEnd(Runner* runner) : runner_(runner) {}  // null: none runs
   ~StopAtEnd() {
     if (runner_ != nullptr) runner_->stop();
   }
@@ -96,24 +100,29 @@ class StopAtEnd {
   Runner* runner_;
 };
 
-// Everything of one live run, made in the order in which it depends on each other.
+// One live run. Members are in the order of their dependence.
 class LiveRun {
  public:
   LiveRun(const Options& options, const Config& config, LiveEnvironment* environment);
 
   int run(const std::function<Config()>& reload, const ThreadHooks& hooks);
+  // Ends the recorder's thread, where it runs.
+  void stop();
 
  private:
   [[nodiscard]] std::unique_ptr<Session> open_session();
-  [[nodiscard]] PipelineOptions pipeline_options();
+  [[nodiscard]] PipelineOptions pipeline_options() const;
+  [[nodiscard]] PipelineParts pipeline_parts();
   [[nodiscard]] bool wants_results() const {
     return !options_.output.empty() || !options_.trajectory.empty();
   }
   [[nodiscard]] std::unique_ptr<SecondCamera> open_second(std::unique_ptr<drivers::Camera> camera) const;
-  void open_recorder();
+  void open_log_file_aside();
+  void open_recorder_aside();
   void open_wheels();
   void run_threads(const ThreadHooks& hooks);
   void tick(const std::function<Config()>& reload);
+  [[nodiscard]] bool all_threads_alive(double now_s);
   void take_over(const std::function<Config()>& reload);
   void tell_status(double now_s);
   void open_control();
@@ -127,8 +136,10 @@ class LiveRun {
   Config config_;
   const calibration_t calibration_;
   ServiceManager manager_;
+  SideFunctions side_;
   Outputs outputs_;
-  std::optional<Recorder> recorder_;
+  LateOpened<Recorder> recorder_;
+  std::optional<Thread> recording_;
   std::unique_ptr<WheelSource> wheels_;  // null: none is configured
   std::optional<ControlSocket> control_;
   std::unique_ptr<SecondCamera> second_;  // null: none is configured
@@ -137,25 +148,29 @@ class LiveRun {
   RealtimeReport realtime_;
   Pipeline pipeline_;
   double next_status_s_ = 0;
-  std::int64_t left_out_said_ = 0;
-  slam::State state_said_ = slam::State::kStarting;
+  // As logged last.
+  struct Logged {
+    std::int64_t left_out = 0;  // of the recording
+    slam::State state = slam::State::kStarting;
+    const char* hung = nullptr;  // thread
+  } logged_;
 };
 
 LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* environment)
     : options_(options),
       config_(config),
       calibration_(read_calibration(config)),
-      outputs_(options, config, Outputs::Use::kLive),
+      outputs_(options, config, &side_),
       second_(open_second(std::move(environment->second_camera))),
       source_(environment->camera ? std::move(environment->camera)
                                   : make_camera(config.camera.driver, camera_options(config, calibration_, 0),
                                                 "camera.device")),
       session_(open_session()),
       realtime_(config.realtime),
-      pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
+      pipeline_(config, pipeline_options(), pipeline_parts()) {
+  open_log_file_aside();
   open_control();
   if (second_) source_.pair_with(second_.get(), config.camera.pair_tolerance_us);
-  if (!options.record.empty()) open_recorder();
   open_wheels();
 }
 
@@ -167,14 +182,26 @@ std::unique_ptr<SecondCamera> LiveRun::open_second(std::unique_ptr<drivers::Came
   return std::make_unique<SecondCamera>(std::move(camera));
 }
 
-void LiveRun::open_recorder() {
-  try {
-    recorder_.emplace(options_.record, calibration_);
-  } catch (const std::runtime_error& error) {
-    throw UsageError(error.what());
-  }
-  source_.record_to(&*recorder_);
-  if (second_) second_->record_to(&*recorder_);
+void LiveRun::open_log_file_aside() {
+  if (config_.log.file == "none") return;
+  side_.begin(SideFunction::kLogFile, "log.file", [log = config_.log] { open_log_file(log); });
+}
+
+void LiveRun::open_recorder_aside() {
+  if (options_.record.empty()) return;
+  side_.begin(SideFunction::kRecording, "--record", [this] {
+    recorder_.set(std::make_unique<Recorder>(options_.record, calibration_));
+    Recorder* recorder = recorder_.get();
+    recording_.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, nullptr,
+                       [recorder] { recorder->run(); });
+    source_.record_to(recorder);
+    if (second_) second_->record_to(recorder);
+  });
+}
+
+void LiveRun::stop() {
+  if (Recorder* recorder = recorder_.get()) recorder->stop();
+  recording_.reset();
 }
 
 void LiveRun::open_wheels() {
@@ -205,9 +232,10 @@ std::unique_ptr<Session> LiveRun::open_session() {
   const std::string second = config_.camera.has_second() ? " and " + config_.camera.second_device : "";
   spdlog::info("farpointd {}, configuration {:016x}, live from {} {}{}", build_text(), config_hash(config_),
                value_text(config_, "camera.driver"), config_.camera.device, second);
-  // A vehicle drives for hours: where nobody asks for the way, memory must not grow with it.
+  // Memory grows with the way only where its results are asked for: a vehicle drives for hours.
   config_.estimator.capacity.whole_trajectory = wants_results();
-  std::unique_ptr<Session> session = make_session(config_, calibration_, &outputs_, !options_.output.empty());
+  std::unique_ptr<Session> session =
+      make_session(config_, calibration_, &outputs_, !options_.output.empty(), wants_results());
   if (config_.realtime.deadline_ms == 0.0) session->reporter().set_deadline(1e3 / config_.camera.rate_hz);
   return session;
 }
@@ -221,14 +249,17 @@ void LiveRun::open_control() {
   }
 }
 
-PipelineOptions LiveRun::pipeline_options() {
+PipelineOptions LiveRun::pipeline_options() const {
   PipelineOptions o;
   o.width_px = calibration_.cameras.front().width;
   o.height_px = calibration_.cameras.front().height;
+  o.rate_hz = config_.camera.rate_hz;
   o.no_camera_after_s = config_.camera.lost_after_s;
-  o.remember = wants_results();
-  o.realtime = &realtime_;
   return o;
+}
+
+PipelineParts LiveRun::pipeline_parts() {
+  return {&source_, &session_->estimator(), &session_->reporter(), &outputs_, &session_->tally(), &realtime_};
 }
 
 int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks) {
@@ -251,15 +282,12 @@ int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks
 }
 
 void LiveRun::run_threads(const ThreadHooks& hooks) {
-  // However it ends, these threads must be told before they are joined; the recorder's after all that record.
-  std::optional<Thread> recording;
-  if (recorder_)
-    recording.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, &realtime_,
-                      [this] { recorder_->run(); });
-  const StopAtEnd stop_recorder(recorder_ ? &*recorder_ : nullptr);
+  // Each of these threads must stop before it is joined; the recorder's after all that record.
+  const StopAtEnd stop_recording(this);
   std::optional<Thread> second_capture;
   if (second_)
-    second_capture.emplace(SecondCamera::kThread, config_.realtime, config_.realtime.capture, &realtime_,
+    second_capture.emplace(SecondCamera::kThread, config_.realtime,
+                           resolved(config_.realtime, usable_cores()).capture, &realtime_,
                            [this] { second_->run(); });
   const StopAtEnd stop_second(second_.get());
   std::optional<Thread> wheels;
@@ -267,6 +295,10 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
     wheels.emplace(WheelSource::kThread, config_.realtime, ThreadConfig{}, &realtime_,
                    [this] { wheels_->run(); });
   const StopAtEnd stop_wheels(wheels_.get());
+  outputs_.start_writing(config_.realtime, &realtime_);
+  open_recorder_aside();
+  const StopAtEnd stop_side(&side_);
+  side_.start(config_.realtime, nullptr);
   pipeline_.run(hooks);
   outputs_.farewell();
   manager_.stopping();
@@ -279,21 +311,32 @@ void LiveRun::tick(const std::function<Config()>& reload) {
   if (ReloadOnSignal::take()) take_over(reload);
   if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
-  manager_.watch(now_s, [this] { return pipeline_.has_progressed(); });
-  if (const slam::State state = pipeline_.state(); state != state_said_) {
-    spdlog::info("{} -> {}", to_string(state_said_), to_string(state));
-    state_said_ = state;
+  manager_.watch(now_s, [&] { return all_threads_alive(now_s); });
+  if (const slam::State state = pipeline_.state(); state != logged_.state) {
+    spdlog::info("{} -> {}", to_string(logged_.state), to_string(state));
+    logged_.state = state;
   }
   if (now_s >= next_status_s_) tell_status(now_s);
+}
+
+bool LiveRun::all_threads_alive(double now_s) {
+  const char* hung = pipeline_.hung_thread(now_s);
+  if (hung != logged_.hung && hung != nullptr)
+    spdlog::error("{} has finished nothing within its limit (section watchdog): the watchdog is not fed",
+                  hung);
+  if (hung != logged_.hung && hung == nullptr) spdlog::warn("{} makes progress again", logged_.hung);
+  logged_.hung = hung;
+  return hung == nullptr;
 }
 
 void LiveRun::tell_status(double now_s) {
   next_status_s_ = now_s + kStatusEvery_s;
   manager_.status(status_text());
-  if (!recorder_ || recorder_->left_out() == left_out_said_) return;
-  left_out_said_ = recorder_->left_out();
+  const Recorder* recorder = recorder_.get();
+  if (recorder == nullptr || recorder->left_out() == logged_.left_out) return;
+  logged_.left_out = recorder->left_out();
   spdlog::warn("{}: {} images left out so far: the disk cannot follow, or is full", options_.record,
-               left_out_said_);
+               logged_.left_out);
 }
 
 std::string LiveRun::status_text() const {
@@ -335,16 +378,29 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
 }
 
 int LiveRun::conclude() {
-  const RunEnd& end = wants_results() ? session_->finish(InputCounts{}) : session_->end();
-  std::vector<std::string> written = outputs_.close(end);
-  if (recorder_) {
-    recorder_->close();
+  outputs_.finish_writing();
+  const RunEnd& end = wants_results() ? session_->finish(pipeline_.input()) : session_->end();
+  // One file that cannot be stored takes no other with it.
+  std::string problems;
+  const auto close = [&problems](const auto& close_files) {
+    try {
+      close_files();
+    } catch (const std::runtime_error& error) {
+      problems += (problems.empty() ? "" : "; ") + std::string(error.what());
+    }
+  };
+  std::vector<std::string> written;
+  close([&] { outputs_.close(end, &written); });
+  close([&] {
+    if (recorder_.get() == nullptr) return;
+    recorder_.get()->close();
     written.push_back(options_.record);
-  }
+  });
   std::fprintf(
       line_stream(options_), "%s\n",
-      last_line(end, InputCounts{}, pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
+      last_line(end, pipeline_.input(), pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
           .c_str());
+  if (!problems.empty()) throw std::runtime_error(problems);
   return 0;
 }
 

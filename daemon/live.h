@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The daemon on the vehicle: a camera in, until it is told to stop.
+// The daemon on the vehicle: from a camera, until a signal.
 #pragma once
 
 #include <functional>
@@ -12,16 +12,17 @@
 
 namespace farpoint::daemon {
 
-// What tests put in the machine's place.
+// What tests replace of the machine.
 struct LiveEnvironment {
-  // Null: the one that is configured. The second is used where one is configured.
+  // Null: the configured one. The second is used where one is configured.
   std::unique_ptr<drivers::Camera> camera, second_camera;
   ThreadHooks hooks;
 };
 
-// Runs until SIGTERM or SIGINT. SIGHUP calls `reload` and takes over what may change meanwhile; what may not
-// is said. Returns the exit status. Throws UsageError, ConfigError or InputError before the first frame,
-// std::runtime_error while running.
+// Runs until SIGTERM or SIGINT. SIGHUP calls `reload` and takes over the keys that may change meanwhile; the
+// others are logged. A file or network that cannot be used does not stop the run (SideFunctions). Returns the
+// exit status. Throws UsageError, ConfigError or InputError before the first frame, std::runtime_error while
+// running.
 int live(const Options& options, const Config& config, const std::function<Config()>& reload,
          LiveEnvironment environment = {});
 

@@ -39,15 +39,17 @@ std::string stopped_by(int signal, const char* when) {
   return fmt::format("stopped by signal {} {}", signal, when);
 }
 
-// Puts the outputs in their place and prints the last line. Returns the exit status. A replay that a signal
-// stopped ends like one whose log is over, and says so.
+// Closes the outputs and prints the last line. Returns the exit status. A replay stopped by a signal closes
+// its outputs as one at the end of its log does, and prints the signal.
 int conclude(const Options& options, const LogFrameSource& source, std::int64_t frames_dropped,
              std::vector<double> cpu_ms, Session* session, Outputs* outputs) {
   outputs->farewell();
   const int signal = StopOnSignal::signal();
   if (session == nullptr) throw std::runtime_error(stopped_by(signal, "before the first image"));
+  outputs->finish_writing();
   const RunEnd& end = session->finish(source.counts());
-  const std::vector<std::string> written = outputs->close(end);
+  std::vector<std::string> written;
+  outputs->close(end, &written);
   const ipc::LogDamage& damage = source.damage();
   if (damage.cut_off) {
     std::fprintf(
@@ -71,7 +73,7 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
 int replay_in_order(const Options& options, const Config& config, Schedule* schedule) {
   const StopOnSignal stop;
   LogFrameSource source(options.replay, config.camera.index);
-  Outputs outputs(options, config, Outputs::Use::kReplay, schedule != nullptr ? schedule->boot_counter() : 0);
+  Outputs outputs(options, config, schedule != nullptr ? schedule->boot_counter() : 0);
   std::unique_ptr<Session> session;
   std::optional<MeasurementFeed> feed;
   std::vector<double> cpu_ms;  // of decoding and tracking, a frame
@@ -119,10 +121,12 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   PipelineOptions pipeline_options;
   pipeline_options.width_px = first.image->width_px;
   pipeline_options.height_px = first.image->height_px;
-  pipeline_options.realtime = &realtime;
-  Pipeline pipeline(config, pipeline_options, &paced, session.get(), &outputs);
+  const PipelineParts parts{&paced,   &session->estimator(), &session->reporter(),
+                            &outputs, &session->tally(),     &realtime};
+  Pipeline pipeline(config, pipeline_options, parts);
   ThreadHooks all_hooks = hooks;
   all_hooks.on_started = [&] { realtime.print(); };
+  outputs.start_writing(config.realtime, &realtime);
   pipeline.run(all_hooks);
   return conclude(options, source, pipeline.frames_dropped(), pipeline.take_tracking_cpu_ms(), session.get(),
                   &outputs);

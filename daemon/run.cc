@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/run.h"
 
+#include <spdlog/spdlog.h>
+
 #include <cstdio>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "daemon/config/config.h"
 #include "daemon/config/options.h"
@@ -19,15 +23,28 @@ namespace {
 constexpr const char* kSystemConfig = "/etc/farpoint/farpoint.yaml";
 constexpr int kFailed = 1, kWrongUse = 2;
 
-Config load_configuration(const Options& options) {
+// *warnings: about a kept file.
+Config load_configuration(const Options& options, std::vector<std::string>* warnings) {
   Config config;
   ConfigOrigins origins;
   std::error_code ignored;
   if (options.config_path || std::filesystem::exists(kSystemConfig, ignored)) {
-    load_config_file(options.config_path.value_or(kSystemConfig), &config, &origins);
+    load_config_file(options.config_path.value_or(kSystemConfig), &config, &origins, warnings);
   }
   for (const std::string& setting : options.settings) apply_setting(setting, &config, &origins);
   check_relations(config, origins);
+  return config;
+}
+
+void warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) spdlog::warn("configuration: {}", warning);
+}
+
+// While the daemon runs.
+Config read_configuration(const Options& options) {
+  std::vector<std::string> warnings;
+  Config config = load_configuration(options, &warnings);
+  warn(warnings);
   return config;
 }
 
@@ -50,14 +67,17 @@ int run_checked(int argc, const char* const* argv) {
     std::fputs(line.text_and_leave.c_str(), stdout);
     return 0;
   }
-  Config config = load_configuration(line.options);
+  std::vector<std::string> warnings;
+  Config config = load_configuration(line.options, &warnings);
   load_solver(ceres_module_path(), &config.estimator.mapping);
   start_logging(config.log.level);
   if (line.options.replay.empty()) {
     start_service_log(config.log);
     const ServiceLogEnd end;
-    return live(line.options, config, [&line] { return load_configuration(line.options); });
+    warn(warnings);
+    return live(line.options, config, [&line] { return read_configuration(line.options); });
   }
+  warn(warnings);
   return replay(line.options, config);
 }
 

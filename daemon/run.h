@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole program but for main().
+// The whole program, without main().
 #pragma once
 
 namespace farpoint::daemon {

@@ -27,7 +27,7 @@ class LcmPublisher {
 
   // Allocates and touches the buffer. Throws std::runtime_error naming what is missing: a multicast route or
   // a known provider. An LCM object on UDP needs a route to its group, even on loopback:
-  //   ip route add 224.0.0.0/4 dev lo
+  //   ip route add 239.255.76.67/32 dev lo
   explicit LcmPublisher(const std::string& url, std::size_t buffer_bytes = kDefaultBufferBytes);
   ~LcmPublisher();
   LcmPublisher(const LcmPublisher&) = delete;

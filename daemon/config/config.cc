@@ -148,8 +148,9 @@ void assign(const ConfigKey& key, const std::string& text, bool quoted, const st
 // Walks one YAML map. The depth is bounded by the table: an unknown section ends the walk.
 class FileReader {
  public:
-  FileReader(std::string file, Config* config, ConfigOrigins* origins)
-      : file_(std::move(file)), config_(config), origins_(origins) {}
+  FileReader(std::string file, Config* config, ConfigOrigins* origins, std::vector<std::string>* warnings,
+             std::span<const DroppedKey> dropped)
+      : file_(std::move(file)), config_(config), origins_(origins), warnings_(warnings), dropped_(dropped) {}
 
   void read_section(const YAML::Node& node, const std::string& section) {
     std::map<std::string, int> seen;
@@ -182,6 +183,7 @@ class FileReader {
       return;
     }
     const ConfigKey* key = find_key(name);
+    if (key == nullptr && passed_over(name, place(name_node))) return;
     if (key == nullptr) fail(place(name_node), name + ": unknown key, " + suggestion(name));
     if (!value.IsScalar()) {
       const char* found = value.IsNull() ? "nothing" : value.IsMap() ? "a section" : "a list";
@@ -190,9 +192,24 @@ class FileReader {
     assign(*key, value.Scalar(), value.Tag() == "!", place(name_node), config_, origins_);
   }
 
+  // True for a dropped key, or a section of such keys.
+  bool passed_over(const std::string& name, const std::string& where) {
+    const auto key = std::find_if(dropped_.begin(), dropped_.end(), [&](const DroppedKey& k) {
+      return k.name == name || k.name.starts_with(name + ".");
+    });
+    if (key == dropped_.end()) return false;
+    const bool whole_section = key->name != name;
+    const std::string advice = whole_section || key->heir.empty() ? "" : "; set " + key->heir + " instead";
+    if (warnings_ != nullptr)
+      warnings_->push_back(where + ": " + name + ": no key of this version, passed over" + advice);
+    return true;
+  }
+
   std::string file_;
   Config* config_;
   ConfigOrigins* origins_;
+  std::vector<std::string>* warnings_;
+  std::span<const DroppedKey> dropped_;
 };
 
 std::string read_file(const std::string& path) {
@@ -242,12 +259,14 @@ void check_can(const CanConfig& can, const ConfigOrigins& origins) {
 
 }  // namespace
 
-void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins) {
-  load_config_text(read_file(path), path, config, origins);
+void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins,
+                      std::vector<std::string>* warnings) {
+  load_config_text(read_file(path), path, config, origins, warnings);
 }
 
 void load_config_text(const std::string& text, const std::string& file_name, Config* config,
-                      ConfigOrigins* origins) {
+                      ConfigOrigins* origins, std::vector<std::string>* warnings,
+                      std::span<const DroppedKey> dropped) {
   std::vector<YAML::Node> documents;
   try {
     documents = YAML::LoadAll(text);
@@ -259,7 +278,7 @@ void load_config_text(const std::string& text, const std::string& file_name, Con
     fail(file_name + ":" + std::to_string(documents[1].Mark().line + 1), "a second document, expected one");
   }
   if (documents.empty() || documents[0].IsNull()) return;
-  FileReader reader(file_name, config, origins);
+  FileReader reader(file_name, config, origins, warnings, dropped);
   if (!documents[0].IsMap())
     fail(reader.place(documents[0]), "not a map, expected 'section:' and 'key: value' lines");
   reader.read_section(documents[0], "");

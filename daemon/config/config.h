@@ -100,9 +100,13 @@ struct CanConfig {
 
 enum class SchedulingPolicy { kFifo, kRoundRobin };
 
+// What the threads ask for where the configuration leaves it open (daemon/system/core_plan.h).
+enum class RealtimeProfile { kDesk, kVehicle };
+
 struct ThreadConfig {
-  int priority = 0;  // 0: ordinary scheduling
-  int core = -1;     // -1: any
+  static constexpr int kByProfile = -1;
+  int priority = kByProfile;  // 0: ordinary scheduling
+  int core = kByProfile;
 };
 
 // Threaded runs.
@@ -111,11 +115,18 @@ struct RealtimeConfig {
   int stack_kb = 512;           // of each thread
   int capture_queue = 2;        // images that wait for tracking at most
   double least_features = 0.5;  // share of extractor.features, while tracking does not keep pace
+  RealtimeProfile profile = RealtimeProfile::kDesk;
   SchedulingPolicy policy = SchedulingPolicy::kFifo;
   ThreadConfig capture, tracking, output, mapping;
   double deadline_ms = 0;   // mid-exposure to output; 0: live a frame period, in replay none
   int cpu_latency_us = -1;  // live; -1: unchanged
   bool require = false;     // exit if the system refuses one of these
+  int disk_ring_mb = 8;     // what may wait for a slow disk
+};
+
+// Live: longest time without progress of a thread that has work, before the watchdog is no longer fed.
+struct WatchdogConfig {
+  double capture_s = 0.5, tracking_s = 0.5, mapping_s = 2.0, output_s = 0.5;
 };
 
 struct Config {
@@ -127,6 +138,7 @@ struct Config {
   LcmConfig lcm;
   CanConfig can;
   RealtimeConfig realtime;
+  WatchdogConfig watchdog;
   slam::EstimatorConfig estimator;
 };
 
@@ -161,10 +173,21 @@ struct ConfigKey {
 // The place where each key was last set ("FILE:LINE" or "--set"); a missing key has its built-in default.
 using ConfigOrigins = std::map<std::string, std::string>;
 
-// Reads a YAML file, or its text, over *config. Throws ConfigError.
-void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins);
+// A key of an earlier version.
+struct DroppedKey {
+  std::string name;
+  std::string heir;  // what to set instead; empty: nothing
+};
+// All of them. A key that is taken off config_keys() is added here.
+[[nodiscard]] std::span<const DroppedKey> dropped_keys();
+
+// Reads a YAML file, or its text, over *config. Throws ConfigError. A kept file may hold dropped keys: they
+// are passed over, and *warnings gets one line for each. `dropped`: the table, for tests.
+void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins,
+                      std::vector<std::string>* warnings = nullptr);
 void load_config_text(const std::string& text, const std::string& file_name, Config* config,
-                      ConfigOrigins* origins);
+                      ConfigOrigins* origins, std::vector<std::string>* warnings = nullptr,
+                      std::span<const DroppedKey> dropped = dropped_keys());
 // Applies one "dotted.key=value" of the command line. Throws ConfigError.
 void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins);
 // Checks conditions between keys. Throws ConfigError.

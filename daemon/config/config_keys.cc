@@ -138,18 +138,25 @@ std::vector<ConfigKey> make_keys() {
       integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),
       integer("realtime.capture_queue", "images", 1, 100, FIELD(realtime.capture_queue)),
       number("realtime.least_features", "", 0.2, 1, FIELD(realtime.least_features)),
+      enumeration("realtime.profile", {"desk", "vehicle"}, FIELD(realtime.profile)),
       enumeration("realtime.policy", {"fifo", "rr"}, FIELD(realtime.policy)),
-      integer("realtime.capture_priority", "", 0, 90, FIELD(realtime.capture.priority)),
+      integer("realtime.capture_priority", "", -1, 90, FIELD(realtime.capture.priority)),
       integer("realtime.capture_core", "", -1, 1023, FIELD(realtime.capture.core)),
-      integer("realtime.tracking_priority", "", 0, 90, FIELD(realtime.tracking.priority)),
+      integer("realtime.tracking_priority", "", -1, 90, FIELD(realtime.tracking.priority)),
       integer("realtime.tracking_core", "", -1, 1023, FIELD(realtime.tracking.core)),
-      integer("realtime.output_priority", "", 0, 90, FIELD(realtime.output.priority)),
+      integer("realtime.output_priority", "", -1, 90, FIELD(realtime.output.priority)),
       integer("realtime.output_core", "", -1, 1023, FIELD(realtime.output.core)),
-      integer("realtime.mapping_priority", "", 0, 90, FIELD(realtime.mapping.priority)),
+      integer("realtime.mapping_priority", "", -1, 90, FIELD(realtime.mapping.priority)),
       integer("realtime.mapping_core", "", -1, 1023, FIELD(realtime.mapping.core)),
       number("realtime.deadline_ms", "ms", 0, 100000, FIELD(realtime.deadline_ms)),
       integer("realtime.cpu_latency_us", "us", -1, 1000000, FIELD(realtime.cpu_latency_us)),
       boolean("realtime.require", FIELD(realtime.require)),
+      integer("realtime.disk_ring_mb", "MB", 1, 1000, FIELD(realtime.disk_ring_mb)),
+
+      number("watchdog.capture_s", "s", 0.2, 60, FIELD(watchdog.capture_s)),
+      number("watchdog.tracking_s", "s", 0.05, 60, FIELD(watchdog.tracking_s)),
+      number("watchdog.mapping_s", "s", 0.05, 60, FIELD(watchdog.mapping_s)),
+      number("watchdog.output_s", "s", 0.05, 60, FIELD(watchdog.output_s)),
 
       integer("pyramid.levels", "levels", 1, 16, FIELD(estimator.pyramid.levels)),
       number("pyramid.scale_factor", "", 1.05, 2, FIELD(estimator.pyramid.scale_factor)),
@@ -234,6 +241,12 @@ std::string range_text(const ConfigKey& key) {
 
 std::span<const ConfigKey> config_keys() {
   static const std::vector<ConfigKey> keys = make_keys();
+  return keys;
+}
+
+std::span<const DroppedKey> dropped_keys() {
+  // None so far: since the first version keys were added only.
+  static const std::vector<DroppedKey> keys;
   return keys;
 }
 

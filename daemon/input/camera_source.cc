@@ -34,7 +34,8 @@ CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImag
   // Both are CLOCK_MONOTONIC: the age of what is published counts from mid-exposure.
   image->due_s = 1e-6 * static_cast<double>(frame.utime);
   image->decode_cpu_ms = image->decode_wall_ms = -1.0;
-  if (recorder_ != nullptr) recorder_->offer(kIndex, image->image, frame);
+  if (Recorder* recorder = recorder_.load(std::memory_order_acquire))
+    recorder->offer(kIndex, image->image, frame);
   return CaptureStatus::kImage;
 }
 

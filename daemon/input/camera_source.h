@@ -2,6 +2,7 @@
 // A live camera as the capture thread's source, with an optional recorder and second camera.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
 
@@ -16,8 +17,8 @@ namespace farpoint::daemon {
 class CameraSource final : public CaptureSource {
  public:
   explicit CameraSource(std::unique_ptr<drivers::Camera> camera);
-  // Call before the first image. The recorder outlives this object.
-  void record_to(Recorder* recorder) { recorder_ = recorder; }
+  // One other thread, once. The recorder outlives this object.
+  void record_to(Recorder* recorder) { recorder_.store(recorder, std::memory_order_release); }
   // Call before the first image. The other camera outlives this object. Images never wait for it.
   void pair_with(SecondCamera* second, std::int64_t tolerance_us) { stereo_.emplace(second, tolerance_us); }
 
@@ -32,7 +33,7 @@ class CameraSource final : public CaptureSource {
 
   CameraEvents events_;
   std::unique_ptr<drivers::Camera> camera_;
-  Recorder* recorder_ = nullptr;
+  std::atomic<Recorder*> recorder_{nullptr};
   std::optional<StereoWatch> stereo_;
 };
 

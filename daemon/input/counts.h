@@ -20,6 +20,10 @@ struct InputCounts {
 // Messages and frames not sent. The bus is counted here because its sink is no message sink.
 struct OutputCounts {
   std::int64_t can_send_errors = 0, can_bus_offs = 0, can_received = 0;
+  std::int64_t can_not_logged = 0;  // frames missing in the log
+  // Live: bits of the functions that have not begun (SideFunction), and attempts that failed.
+  std::int32_t side_missing = 0;
+  std::int64_t side_failures = 0;
   std::int8_t can_state = 0;  // drivers::CanState
 };
 

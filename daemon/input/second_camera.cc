@@ -20,7 +20,8 @@ void SecondCamera::turn() {
   drivers::CameraFrame frame;
   const bool came = camera_->next(kTurn_ms, &image_, &frame);
   tell(came ? &frame : nullptr);
-  if (came && recorder_ != nullptr) recorder_->offer(kIndex, image_, frame);
+  Recorder* recorder = recorder_.load(std::memory_order_acquire);
+  if (came && recorder != nullptr) recorder->offer(kIndex, image_, frame);
 }
 
 void SecondCamera::tell(const drivers::CameraFrame* frame) {

@@ -29,8 +29,8 @@ class SecondCamera {
   };
 
   explicit SecondCamera(std::unique_ptr<drivers::Camera> camera);
-  // Call before the first image. The recorder outlives this object.
-  void record_to(Recorder* recorder) { recorder_ = recorder; }
+  // One other thread, once. The recorder outlives this object.
+  void record_to(Recorder* recorder) { recorder_.store(recorder, std::memory_order_release); }
 
   // Its thread: runs until stop(), which takes effect within 0.1 s. Waits for the camera only.
   void run();
@@ -52,7 +52,7 @@ class SecondCamera {
 
   CameraEvents events_;
   std::unique_ptr<drivers::Camera> camera_;
-  Recorder* recorder_ = nullptr;
+  std::atomic<Recorder*> recorder_{nullptr};
   ipc::GreyImage image_;
   bool told_streaming_ = false;
   std::int64_t untold_ = 0, told_untold_ = 0;

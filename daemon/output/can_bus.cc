@@ -101,24 +101,27 @@ void CanBus::leave_rest_out() {
 }
 
 void CanBus::note(const ipc::CanFrame& frame, double now_s, std::int64_t age_us) {
-  if (!log_) return;
+  if (log_.get() == nullptr) return;
   if (Logged* slot = logged_.begin_push()) {
     *slot = {micros(now_s) - age_us, frame};
     logged_.end_push();
   } else {
-    ++left_out_;
+    ++not_logged_;
+  }
+}
+
+// --- the thread of the files
+
+void CanBus::write_log() {
+  ipc::CandumpWriter* log = log_.get();
+  if (log == nullptr) return;
+  while (const Logged* logged = logged_.front()) {
+    log->write(logged->utime, {&logged->frame, 1});
+    logged_.pop();
   }
 }
 
 // --- the calling thread
-
-void CanBus::write_log() {
-  if (!log_) return;
-  while (const Logged* logged = logged_.front()) {
-    log_->write(logged->utime, {&logged->frame, 1});
-    logged_.pop();
-  }
-}
 
 // Waits until nothing is in flight; false where something still is.
 bool CanBus::settle(double limit_s) {
@@ -145,13 +148,12 @@ void CanBus::farewell() {
   send_next(now_s);
   if (settle(kLimit_s)) send_next(steady_s());
   (void)settle(kLimit_s);
-  write_log();
 }
 
 void CanBus::close() {
   farewell();
   write_log();
-  if (log_) log_->close();
+  if (ipc::CandumpWriter* log = log_.get()) log->close();
 }
 
 std::int64_t CanBus::errors() const {

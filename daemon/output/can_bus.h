@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "daemon/output/epoch_predictor.h"
+#include "daemon/system/late_opened.h"
 #include "drivers/can/socketcan.h"
 #include "ipc/can_codec.h"
 #include "ipc/candump.h"
@@ -29,8 +30,9 @@ class CanBus final : public PoseSink {
 
   // Before the first tick. Without a bus the epochs go into the log alone.
   void send_on(std::unique_ptr<drivers::SocketCan> bus) { bus_ = std::move(bus); }
-  // The log holds confirmed frames only, each with the time of its confirmation.
-  void log_to(std::unique_ptr<ipc::CandumpWriter> log) { log_ = std::move(log); }
+  // Once, any thread. The log holds confirmed frames only, each with the time of its confirmation.
+  void log_to(std::unique_ptr<ipc::CandumpWriter> log) { log_.set(std::move(log)); }
+  [[nodiscard]] bool is_logged() const { return log_.get() != nullptr; }
   void set_body_is_camera(bool is_camera) { predictor_.set_body_is_camera(is_camera); }
 
   // Output thread, which never waits here.
@@ -40,15 +42,18 @@ class CanBus final : public PoseSink {
   // Time of the next call of tick(); seconds of the steady clock.
   [[nodiscard]] double next_due_s() const;
 
-  // Calling thread: writes the confirmed frames to the log.
+  // Thread of the files: writes the confirmed frames to the log.
   void write_log();
   // Calling thread, after the output thread has ended: sends the last epoch. Waits up to 0.3 s for the bus.
   void farewell();
-  // Renames the log to its final name. Throws std::runtime_error if a write failed.
+  // After the thread of the files has ended: writes the rest of the log and renames it to its final name.
+  // Throws std::runtime_error if a write failed.
   void close();
 
   // Frames that did not reach the bus.
   [[nodiscard]] std::int64_t errors() const;
+  // Frames missing in the log: its ring was full.
+  [[nodiscard]] std::int64_t not_logged() const { return not_logged_; }
   [[nodiscard]] drivers::CanState bus_state() const {
     return bus_ ? bus_->state() : drivers::CanState::kUnknown;
   }
@@ -74,12 +79,12 @@ class CanBus final : public PoseSink {
   ipc::CanEncoder encoder_;
   const double period_s_;
   std::unique_ptr<drivers::SocketCan> bus_;
-  std::unique_ptr<ipc::CandumpWriter> log_;
+  LateOpened<ipc::CandumpWriter> log_;
   slam::SpscRing<Logged> logged_;
   ipc::CanEpoch epoch_;   // being sent
   std::size_t sent_ = 0;  // of its frames
   double next_epoch_s_ = 0, next_maintenance_s_ = 0, look_s_ = kNever_s;
-  std::int64_t left_out_ = 0;  // frames
+  std::int64_t left_out_ = 0, not_logged_ = 0;  // frames
   bool said_farewell_ = false;
 };
 

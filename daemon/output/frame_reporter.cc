@@ -172,7 +172,9 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.can_received = out.can_received;
   s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
-  s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors());
+  s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors()) + out.can_not_logged;
+  s.side_missing = out.side_missing;
+  s.side_failures = out.side_failures;
   s.maps = static_cast<std::int32_t>(counts.maps);
   s.keyframes = static_cast<std::int32_t>(counts.keyframes);
   s.landmarks = static_cast<std::int32_t>(counts.landmarks);

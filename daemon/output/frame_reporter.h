@@ -38,6 +38,7 @@ class FrameReporter {
   void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
   // Any thread.
   void set_status_rate(double rate_hz) { status_rate_hz_.store(rate_hz, std::memory_order_relaxed); }
+  [[nodiscard]] double status_rate_hz() const { return status_rate_hz_.load(std::memory_order_relaxed); }
 
  private:
   void publish_status(const FramePackage& package, const OutputCounts& out);

@@ -13,9 +13,9 @@
 
 namespace farpoint::daemon {
 
-// Mapping encodes what a view was made of, at the configured rate; the output publishes it with the first
-// frame that knows that view. So the map that is shown is the one that was tracked against, and a repeated
-// run shows it at the same frame.
+// Mapping encodes what a view was made of, at the configured rate. The output publishes it with the first
+// frame that has taken that view: the published map is the one tracked against, and a repeated run publishes
+// it at the same frame.
 class MapBoard {
  public:
   explicit MapBoard(const Config& config);

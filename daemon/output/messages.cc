@@ -17,7 +17,7 @@ constexpr int kQuantiles = 101;
 // The estimator gives keyframe poses without their times.
 constexpr std::int64_t kUnknownUtime = -1;
 
-// The estimate as it may be told: NaN where there is none.
+// The estimate as published: NaN where there is none.
 slam::SE3 known(bool has_pose, const slam::SE3& T) {
   if (has_pose) return T;
   slam::SE3 unknown;

@@ -36,9 +36,11 @@ struct MapContent {
 
 // Everything the end of a run is summarised from.
 struct RunEnd {
-  std::int64_t utime = 0;   // of the last frame
-  slam::FrameResult last;   // with scale.assumed applied
-  std::int64_t frames = 0;  // of the recording, posed or not
+  std::int64_t utime = 0;               // of the last frame
+  std::int64_t first_utime = 0;         // of the first frame
+  std::int64_t initialised_utime = -1;  // of the first frame with a map; -1: none had one
+  slam::FrameResult last;               // with scale.assumed applied
+  std::int64_t frames = 0;              // of the recording, posed or not
   std::int64_t frames_valid = 0;
   std::vector<std::int64_t> live_utimes;                   // of valid frames, ascending
   std::vector<slam::MapTrajectory> trajectories;           // most frames first

@@ -3,19 +3,63 @@
 
 #include <spdlog/spdlog.h>
 
+#include <functional>
+#include <utility>
+
 #include "daemon/system/boot_counter.h"
 #include "drivers/can/link_info.h"
 
 namespace farpoint::daemon {
+namespace {
 
-Outputs::Outputs(const Options& options, const Config& config, Use use, std::int32_t boot_counter)
-    : options_(options), use_(use), boot_counter_(boot_counter) {
-  if (use == Use::kLive) count_start(config);
+std::size_t ring_bytes(const Config& config) {
+  return static_cast<std::size_t>(config.realtime.disk_ring_mb) * 1'000'000;
+}
+
+bool writes_files(const Options& options) {
+  return !options.output.empty() || !options.live_trajectory.empty();
+}
+
+// Closes files, each by itself.
+class Closing {
+ public:
+  explicit Closing(std::vector<std::string>* written) : written_(*written) {}
+  // close_files returns the paths of what it closed.
+  void close(const std::function<std::vector<std::string>()>& close_files) {
+    try {
+      for (std::string& path : close_files()) written_.push_back(std::move(path));
+    } catch (const std::runtime_error& error) {
+      problems_ += (problems_.empty() ? "" : "; ") + std::string(error.what());
+    }
+  }
+  void throw_problems() const {
+    if (!problems_.empty()) throw std::runtime_error(problems_);
+  }
+
+ private:
+  std::vector<std::string>& written_;
+  std::string problems_;
+};
+
+}  // namespace
+
+Outputs::Outputs(const Options& options, const Config& config, std::int32_t boot_counter)
+    : options_(options), side_(nullptr), boot_counter_(boot_counter) {
+  if (is_steady()) files_ = std::make_unique<FileWriter>(ring_bytes(config));
   try {
     open_files(config);
   } catch (const std::runtime_error& error) {
     throw UsageError(error.what());
   }
+  open_network(config);
+  open_bus(config);
+}
+
+Outputs::Outputs(const Options& options, const Config& config, SideFunctions* side)
+    : options_(options), side_(side) {
+  count_start(config);
+  files_ = std::make_unique<FileWriter>(writes_files(options) ? ring_bytes(config) : 0);
+  open_files(config);
   open_network(config);
   open_bus(config);
 }
@@ -42,7 +86,12 @@ OutputCounts Outputs::counts() const {
   OutputCounts counts;
   counts.can_send_errors = (bus_ ? bus_->errors() : 0) + (replay_ ? replay_->errors() : 0);
   counts.can_received = wheels_ != nullptr ? wheels_->received() : 0;
+  if (is_live()) {
+    counts.side_missing = side_->missing();
+    counts.side_failures = side_->failures();
+  }
   if (!bus_) return counts;
+  counts.can_not_logged = bus_->not_logged();
   counts.can_bus_offs = static_cast<std::int64_t>(bus_->bus_counts().bus_off);
   counts.can_state = static_cast<std::int8_t>(bus_->bus_state());
   return counts;
@@ -62,80 +111,149 @@ void Outputs::set_body_is_camera(bool is_camera) {
   if (replay_) replay_->set_body_is_camera(is_camera);
 }
 
-void Outputs::write_logs() {
-  if (bus_) bus_->write_log();
+void Outputs::start_writing(const RealtimeConfig& config, RealtimeReport* report) {
+  if (!files_ || (!writes_files(options_) && options_.can_log.empty())) return;
+  if (bus_) files_->add_turn([this] { bus_->write_log(); });
+  files_->start(config, report);
 }
 
 void Outputs::farewell() {
   if (bus_) bus_->farewell();
 }
 
-std::vector<std::string> Outputs::close(const RunEnd& end) {
-  std::vector<std::string> written;
+void Outputs::finish_writing() {
+  if (files_) files_->stop();
+}
+
+void Outputs::close(const RunEnd& end, std::vector<std::string>* written) {
   farewell();
-  if (log_) {
-    log_->close();
-    written.push_back(options_.output);
-  }
-  if (!options_.trajectory.empty()) {
-    for (auto& path : write_final_trajectories(options_.trajectory, end.trajectories, end.unit_scale)) {
-      written.push_back(std::move(path));
-    }
-  }
-  if (live_) {
-    live_->close();
-    written.push_back(options_.live_trajectory);
-  }
+  finish_writing();
+  Closing closing(written);
+  closing.close([this] { return close_log(); });
+  closing.close([&] { return write_trajectories(end); });
+  closing.close([this] { return close_live_trajectory(); });
+  closing.close([this] { return close_buses(); });
+  closing.close([this]() -> Paths {
+    warn_of_losses();
+    return {};
+  });
+  closing.throw_problems();
+}
+
+Outputs::Paths Outputs::close_log() {
+  ipc::LogWriter* log = log_.get();
+  if (log == nullptr) return {};
+  log->close();
+  return {options_.output};
+}
+
+Outputs::Paths Outputs::write_trajectories(const RunEnd& end) const {
+  if (options_.trajectory.empty()) return {};
+  return write_final_trajectories(options_.trajectory, end.trajectories, end.unit_scale);
+}
+
+Outputs::Paths Outputs::close_live_trajectory() {
+  if (!live_ || !live_->is_open()) return {};
+  live_->close();
+  return {options_.live_trajectory};
+}
+
+Outputs::Paths Outputs::close_buses() {
+  const bool is_logged = (bus_ && bus_->is_logged()) || (replay_ && !options_.can_log.empty());
   if (bus_) bus_->close();
   if (replay_) replay_->close();
-  if (!options_.can_log.empty()) written.push_back(options_.can_log);
+  return is_logged ? Paths{options_.can_log} : Paths{};
+}
+
+void Outputs::warn_of_losses() const {
   if (publisher_.network_errors() > 0) spdlog::warn("{} messages were not sent", publisher_.network_errors());
   if (counts().can_send_errors > 0) spdlog::warn("{} CAN frames were not sent", counts().can_send_errors);
-  return written;
+  const std::uint64_t dropped = files_ ? files_->dropped() : 0;
+  if (dropped == 0) return;
+  const std::string problem =
+      fmt::format("{} messages are missing in the files: the disk was too slow", dropped);
+  // A replay that is not whole cannot be compared or repeated.
+  if (!is_live()) throw std::runtime_error(problem);
+  spdlog::warn("{}", problem);
+}
+
+void Outputs::open_file(SideFunction which, const std::string& path, const SideFunctions::Begin& open) {
+  if (is_live())
+    side_->begin(which, path, open);
+  else
+    open();
 }
 
 void Outputs::open_files(const Config& config) {
-  if (!options_.output.empty()) {
-    log_ = std::make_unique<ipc::LogWriter>(options_.output);
-    publisher_.add(std::make_unique<LogMessageSink>(log_.get()));
-  }
-  if (!options_.live_trajectory.empty()) live_ = std::make_unique<LiveTrajectory>(options_.live_trajectory);
-  if (!options_.can_log.empty()) {
-    auto log = std::make_unique<ipc::CandumpWriter>(options_.can_log, bus_name(config), config.can.fd);
-    if (use_ == Use::kLive)
-      make_bus(config)->log_to(std::move(log));
-    else
-      make_replay(config)->log_to(std::move(log));
-  }
+  if (!options_.output.empty()) open_log();
+  if (!options_.live_trajectory.empty()) open_live_trajectory();
+  if (!options_.can_log.empty()) open_can_log(config);
+  if (options_.trajectory.empty()) return;
   // Written at the end only: find out now whether that will be possible.
-  if (!options_.trajectory.empty()) ipc::ReplacedPath probe(options_.trajectory);
+  try {
+    ipc::ReplacedPath probe(options_.trajectory);
+  } catch (const std::runtime_error& error) {
+    if (!is_live()) throw;
+    spdlog::warn("{}; it is tried again at the end", error.what());
+  }
+}
+
+void Outputs::open_log() {
+  open_file(SideFunction::kOutputLog, options_.output,
+            [this] { log_.set(std::make_unique<ipc::LogWriter>(options_.output)); });
+  if (files_)
+    publisher_.add(std::make_unique<QueuedLogSink>(files_.get(), &log_));
+  else
+    publisher_.add(std::make_unique<LogMessageSink>(log_.get()));
+}
+
+void Outputs::open_live_trajectory() {
+  live_ = files_ ? std::make_unique<LiveTrajectory>(files_.get()) : std::make_unique<LiveTrajectory>();
+  open_file(SideFunction::kLiveTrajectory, options_.live_trajectory,
+            [this] { live_->open(options_.live_trajectory); });
+}
+
+void Outputs::open_can_log(const Config& config) {
+  const std::string name = bus_name(config);
+  const auto make_log = [this, name, fd = config.can.fd] {
+    return std::make_unique<ipc::CandumpWriter>(options_.can_log, name, fd);
+  };
+  if (!is_live()) return make_replay(config)->log_to(make_log());
+  make_bus(config);
+  open_file(SideFunction::kCanLog, options_.can_log, [this, make_log] { bus_->log_to(make_log()); });
 }
 
 void Outputs::open_network(const Config& config) {
-  const bool live = use_ == Use::kLive;
-  if (!options_.lcm_url && !(live && config.lcm.enabled)) return;
+  if (!options_.lcm_url && !(is_live() && config.lcm.enabled)) return;
   const std::string url = options_.lcm_url.value_or("").empty() ? config.lcm.url : *options_.lcm_url;
+  if (is_live()) return open_live_network(url);
   try {
     publisher_.add(std::make_unique<LcmMessageSink>(url));
   } catch (const std::runtime_error& error) {
-    if (live) throw;
     spdlog::warn("{}; replay goes on without the network", error.what());
   }
 }
 
+void Outputs::open_live_network(const std::string& url) {
+  if (const std::string problem = lcm_url_problem(url); !problem.empty())
+    throw ConfigError(fmt::format("configuration: lcm.url: '{}', {}", url, problem));
+  auto sink = std::make_unique<LcmMessageSink>();
+  LcmMessageSink* lcm = sink.get();
+  publisher_.add(std::move(sink));
+  side_->begin(SideFunction::kLcm, "LCM", [lcm, url] { lcm->open(url); });
+}
+
 void Outputs::open_bus(const Config& config) {
-  const bool live = use_ == Use::kLive;
-  if (!options_.can_interface && !(live && config.can.enabled)) return;
+  if (!options_.can_interface && !(is_live() && config.can.enabled)) return;
   const ipc::CanLayout layout = can_layout(config.can);
   drivers::CanOptions options;
   options.fd = layout.fd;
-  options.wait_for_interface = live;
+  options.wait_for_interface = is_live();
   options.extended_ids = layout.extended;
   for (std::size_t i = 0; i < (layout.fd ? 1 : ipc::kCanMessages); ++i)
     options.sent_ids.push_back(layout.id(static_cast<ipc::CanMessage>(i)));
   // Lockstep never waits for the bus.
-  const bool steady = live || options_.speed;
-  options.confirm = steady;
+  options.confirm = is_steady();
   const std::string name = bus_name(config);
   try {
     auto bus = std::make_unique<drivers::SocketCan>(name, options);
@@ -144,7 +262,7 @@ void Outputs::open_bus(const Config& config) {
     else if (const auto link = drivers::read_link(name))
       if (const std::string problem = drivers::queue_problem(*link, layout.most_frames()); !problem.empty())
         spdlog::warn("CAN interface {}: {}", name, problem);
-    if (steady)
+    if (is_steady())
       make_bus(config)->send_on(std::move(bus));
     else
       make_replay(config)->send_on(std::move(bus));
@@ -157,7 +275,7 @@ EpochOptions Outputs::epoch_options(const Config& config) const {
   EpochOptions options;
   options.pose_frame = config.can.frame;
   options.boot_counter = boot_counter_on_can(boot_counter_);
-  if (use_ == Use::kLive && config.camera.rate_hz > 0.0) options.frame_period_s = 1.0 / config.camera.rate_hz;
+  if (is_live() && config.camera.rate_hz > 0.0) options.frame_period_s = 1.0 / config.camera.rate_hz;
   return options;
 }
 

@@ -12,30 +12,34 @@
 #include "daemon/input/wheel_source.h"
 #include "daemon/output/can_bus.h"
 #include "daemon/output/can_replay.h"
+#include "daemon/output/file_writer.h"
 #include "daemon/output/messages.h"
 #include "daemon/output/publisher.h"
 #include "daemon/output/trajectory_file.h"
+#include "daemon/system/side_functions.h"
 
 namespace farpoint::daemon {
 
+// Live and in a threaded replay, files are written on a thread of their own; lockstep writes them at once.
 class Outputs {
  public:
-  // A replay sends only what its options ask for, and only warns of a network or bus that cannot be used.
-  // Live, the configuration asks, and a network that cannot be used is an error: the service manager tries
-  // again.
-  enum class Use : std::uint8_t { kReplay, kLive };
-  // boot_counter: in replay, that of the run that is repeated, 0 for none. Throws UsageError where a file
-  // cannot be written, std::runtime_error as said above.
-  Outputs(const Options& options, const Config& config, Use use = Use::kReplay,
-          std::int32_t boot_counter = 0);
+  // A replay: sends what its options ask for, and warns of a network or bus that cannot be used.
+  // boot_counter: that of the run that is repeated, 0 for none. Throws UsageError where a file cannot be
+  // written.
+  Outputs(const Options& options, const Config& config, std::int32_t boot_counter = 0);
+  // A live run: sends what the configuration asks for. A file or network that cannot be used is left to
+  // `side`, which outlives this object and must have stopped before its end. Throws ConfigError for a URL
+  // that can never work.
+  Outputs(const Options& options, const Config& config, SideFunctions* side);
 
   // The bus first: it is what a controller waits for.
   [[nodiscard]] std::vector<PoseSink*> sinks();
   [[nodiscard]] Publisher* publisher() { return &publisher_; }
+  // Output thread.
   [[nodiscard]] OutputCounts counts() const;
   // Whether tick() has anything to do.
   [[nodiscard]] bool ticks() const { return bus_ != nullptr || wheels_ != nullptr; }
-  // On the output's thread, often: sends what is due on the bus, and publishes what came from the wheels.
+  // Output thread, often: sends what is due on the bus, and publishes what came from the wheels.
   void tick(double now_s);
   // When tick() has to send something next.
   [[nodiscard]] double next_due_s() const { return bus_ ? bus_->next_due_s() : CanBus::kNever_s; }
@@ -46,28 +50,50 @@ class Outputs {
   // Of this start; 0 in replay.
   [[nodiscard]] std::int32_t boot_counter() const { return boot_counter_; }
 
-  // On the calling thread: writes what waits for the disk.
-  void write_logs();
-  // On the calling thread, after the output's has ended: the bus gets its last epoch.
+  // Before the output thread starts: starts the thread of the files, where there is one. `report` may be
+  // null.
+  void start_writing(const RealtimeConfig& config, RealtimeReport* report);
+  // Calling thread, after the output thread has ended: the bus gets its last epoch.
   void farewell();
+  // Calling thread, after that: waits until the files hold what was published. Results that follow are
+  // written at once.
+  void finish_writing();
 
-  // Puts every file in its place; returns their names. Throws std::runtime_error where something was not
-  // stored. Warns of what was not sent.
-  std::vector<std::string> close(const RunEnd& end);
+  // Renames every file to its final name, each by itself, and appends the names to *written. Throws
+  // std::runtime_error where something was not stored, after all others are closed. Warns of what was not
+  // sent.
+  void close(const RunEnd& end, std::vector<std::string>* written);
 
  private:
+  using Paths = std::vector<std::string>;
+
+  [[nodiscard]] bool is_live() const { return side_ != nullptr; }
+  // The steady clock drives the outputs, and threads of their own.
+  [[nodiscard]] bool is_steady() const { return is_live() || options_.speed.has_value(); }
   void count_start(const Config& config);
+  // A file: in replay it must open now.
+  void open_file(SideFunction which, const std::string& path, const SideFunctions::Begin& open);
   void open_files(const Config& config);
+  void open_log();
+  void open_live_trajectory();
+  void open_can_log(const Config& config);
   void open_network(const Config& config);
+  void open_live_network(const std::string& url);
   void open_bus(const Config& config);
+  Paths close_log();
+  [[nodiscard]] Paths write_trajectories(const RunEnd& end) const;
+  Paths close_live_trajectory();
+  Paths close_buses();
+  void warn_of_losses() const;
   [[nodiscard]] EpochOptions epoch_options(const Config& config) const;
   CanBus* make_bus(const Config& config);
   CanReplay* make_replay(const Config& config);
   [[nodiscard]] std::string bus_name(const Config& config) const;
 
   const Options& options_;
-  const Use use_;
-  std::unique_ptr<ipc::LogWriter> log_;
+  SideFunctions* side_;  // null in replay
+  std::unique_ptr<FileWriter> files_;
+  LateOpened<ipc::LogWriter> log_;
   std::unique_ptr<LiveTrajectory> live_;
   std::int32_t boot_counter_ = 0;
   // Live and in a threaded replay the bus has the steady clock; a replay's log has the recording's.

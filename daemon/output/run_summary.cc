@@ -15,8 +15,19 @@ double percent(std::int64_t part, std::int64_t whole) {
   return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
+// Where the results of the run are not known: maps made so far.
+std::size_t maps_of(const RunEnd& end) {
+  return end.trajectories.empty() ? end.counts.maps : end.trajectories.size();
+}
+
+std::string initialised_text(const RunEnd& end) {
+  if (end.initialised_utime < 0) return "";
+  return fmt::format("initialised after {:.1f} s, ",
+                     1e-6 * static_cast<double>(end.initialised_utime - end.first_utime));
+}
+
 const char* outcome(const RunEnd& end) {
-  if (end.trajectories.empty()) return "done, never initialised";
+  if (maps_of(end) == 0) return "done, never initialised";
   if (end.last.state == slam::State::kLost || end.last.state == slam::State::kRelocalising)
     return "done, lost at the end";
   return "done";
@@ -68,18 +79,18 @@ std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t fra
   std::sort(cpu_ms.begin(), cpu_ms.end());
   double sum_ms = 0.0;
   for (const double ms : cpu_ms) sum_ms += ms;
-  const std::size_t maps = end.trajectories.size();
+  const std::size_t maps = maps_of(end);
   constexpr double kMegabyte = 1e6;
   return fmt::format(
-      "farpointd: {}: {} frames, {} tracked ({:.1f} %), {} map{}, lost {} time{}, scale {}; {:.1f} ms a "
+      "farpointd: {}: {} frames, {} tracked ({:.1f} %), {}{} map{}, lost {} time{}, scale {}; {:.1f} ms a "
       "frame (CPU "
       "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}",
-      outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames), maps,
-      maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s", scale_text(end.last.scale),
-      cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()), quantile(cpu_ms, 0.99),
-      static_cast<double>(peak_resident_bytes()) / kMegabyte, forgotten_text(end.counts),
-      calibration_text(end), refused_text(in, frames_dropped), written.empty() ? "" : "; wrote ",
-      fmt::join(written, " "));
+      outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames),
+      initialised_text(end), maps, maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s",
+      scale_text(end.last.scale), cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()),
+      quantile(cpu_ms, 0.99), static_cast<double>(peak_resident_bytes()) / kMegabyte,
+      forgotten_text(end.counts), calibration_text(end), refused_text(in, frames_dropped),
+      written.empty() ? "" : "; wrote ", fmt::join(written, " "));
 }
 
 std::FILE* line_stream(const Options& o) {

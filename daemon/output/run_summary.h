@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line that ends a replay.
+// The line that ends a run.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace farpoint::daemon {
 [[nodiscard]] std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t frames_dropped,
                                     std::vector<double> cpu_ms, const std::vector<std::string>& written);
 
-// Standard output, but where that carries one of the outputs.
+// Standard output, or standard error where an output goes to standard output.
 [[nodiscard]] std::FILE* line_stream(const Options& options);
 
 // Draws the bar: `fraction` as Progress::show(), `frames` tracked so far.

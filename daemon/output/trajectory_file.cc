@@ -44,15 +44,33 @@ std::size_t put_tum_line(std::int64_t utime, const slam::SE3& T, std::span<char,
   return std::min(end.size, line.size());
 }
 
-LiveTrajectory::LiveTrajectory(const std::string& path) : file_(path) {
-  put(file_.stream(), kHeader);
+LiveTrajectory::LiveTrajectory(FileWriter* files)
+    : files_(files),
+      file_number_(files->add_file([this](std::span<const std::uint8_t> line) { write(line); })) {}
+
+void LiveTrajectory::open(const std::string& path) {
+  auto file = std::make_unique<ipc::OutputFile>(path);
+  put(file->stream(), kHeader);
+  file_.set(std::move(file));
 }
 
 void LiveTrajectory::on_frame(const FrameOutput& frame) {
   if (!frame.valid) return;
-  char line[kMaxTumLine];
-  const std::size_t length = put_tum_line(frame.result.utime, frame.result.T_map_body, line);
-  std::fwrite(line, 1, length, file_.stream());
+  char text[kMaxTumLine];
+  const std::size_t length = put_tum_line(frame.result.utime, frame.result.T_map_body, text);
+  const std::span line(reinterpret_cast<const std::uint8_t*>(text), length);
+  if (files_ != nullptr)
+    (void)files_->push(file_number_, {line});
+  else
+    write(line);
+}
+
+void LiveTrajectory::write(std::span<const std::uint8_t> line) {
+  if (ipc::OutputFile* file = file_.get()) std::fwrite(line.data(), 1, line.size(), file->stream());
+}
+
+void LiveTrajectory::close() {
+  if (ipc::OutputFile* file = file_.get()) file->close();
 }
 
 std::string trajectory_path(const std::string& path, int map_number) {

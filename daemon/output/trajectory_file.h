@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/output/file_writer.h"
 #include "daemon/output/pose_sink.h"
+#include "daemon/system/late_opened.h"
 #include "ipc/output_file.h"
 #include "slam/inspection.h"
 
@@ -21,23 +23,36 @@ namespace farpoint::daemon {
 inline constexpr std::size_t kMaxTumLine = 2560;
 std::size_t put_tum_line(std::int64_t utime, const slam::SE3& T_map_body, std::span<char, kMaxTumLine> line);
 
-// Each valid pose as it is published.
+// Each valid pose as published.
 class LiveTrajectory final : public PoseSink {
  public:
-  explicit LiveTrajectory(const std::string& path);  // throws std::runtime_error where it cannot be written
+  // Writes at once. Throws std::runtime_error if the file cannot be written.
+  explicit LiveTrajectory(const std::string& path) { open(path); }
+  // Writes at once, after open().
+  LiveTrajectory() = default;
+  // Writes on the thread of `files`, which outlives this object. Poses before open() are dropped.
+  explicit LiveTrajectory(FileWriter* files);
+  // Once, any thread. Throws std::runtime_error if the file cannot be written.
+  void open(const std::string& path);
+  [[nodiscard]] bool is_open() const { return file_.get() != nullptr; }
   void on_frame(const FrameOutput& frame) override;
-  void close() { file_.close(); }  // throws std::runtime_error where something was not stored
+  // Throws std::runtime_error if anything was not stored.
+  void close();
 
  private:
-  ipc::OutputFile file_;
+  void write(std::span<const std::uint8_t> line);
+
+  FileWriter* files_ = nullptr;
+  std::uint32_t file_number_ = 0;
+  LateOpened<ipc::OutputFile> file_;
 };
 
 // "dir/NAME.map2.tum" for dir/NAME.tum and 2.
 [[nodiscard]] std::string trajectory_path(const std::string& path, int map_number);
 
-// The first trajectory to `path` (a file that only says so where there is none), the others to NAME.map2.tum,
-// ...; such files of an earlier run beyond these are removed. Positions times unit_scale. Returns the paths
-// written; throws std::runtime_error.
+// Writes the first trajectory to `path`, the others to NAME.map2.tum and so on. Without any, the file holds a
+// comment only. Removes further such files of an earlier run. Positions are multiplied by unit_scale. Returns
+// the written paths. Throws std::runtime_error.
 std::vector<std::string> write_final_trajectories(const std::string& path,
                                                   const std::vector<slam::MapTrajectory>& trajectories,
                                                   double unit_scale);

@@ -7,8 +7,8 @@
 namespace farpoint::daemon {
 namespace {
 
-// So many of so many frames: one hiccup of the machine makes as many frames late as the queue holds, which
-// says nothing of the next ones.
+// kLate late frames of kWindow are overload. Fewer are a hiccup of the machine, which makes as many frames
+// late as the queue holds.
 constexpr int kLate = 4, kWindow = 12;
 constexpr double kStep = 0.8;
 // On-time frames before more is tried: at first about a second. Where that was too much, twice as long, so

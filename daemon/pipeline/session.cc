@@ -48,20 +48,20 @@ void print_calibration(const slam::CalibrationInfo& c) {
 
 }  // namespace
 
-Session::Session(const Config& config, const slam::Rig& rig, std::string calibration_hash,
-                 std::int32_t boot_counter, std::vector<PoseSink*> sinks, Publisher* publisher,
-                 bool with_schedule)
+Session::Session(const Config& config, const slam::Rig& rig, Options options, std::vector<PoseSink*> sinks,
+                 Publisher* publisher)
     : config_(config),
-      names_{build_text(), fmt::format("{:016x}", config_hash(config)), std::move(calibration_hash),
-             boot_counter},
+      names_{build_text(), fmt::format("{:016x}", config_hash(config)), std::move(options.calibration_hash),
+             options.boot_counter},
       estimator_(config.estimator, rig),
       maps_(config),
-      publisher_(publisher) {
+      publisher_(publisher),
+      tally_(options.keep_times) {
   const auto table = estimator_.memory_table();
   pool_bytes_ = sum_bytes(table);
   print_memory_table(table, pool_bytes_);
   reporter_ = std::make_unique<FrameReporter>(config, names_, std::move(sinks), publisher, &maps_,
-                                              static_cast<std::int64_t>(pool_bytes_), with_schedule);
+                                              static_cast<std::int64_t>(pool_bytes_), options.with_schedule);
   if (publisher->has_sinks())
     estimator_.on_view([this](const slam::MappingNote& note) { maps_.note(estimator_.inspect(), note); });
 }
@@ -82,17 +82,8 @@ const FrameOutput& Session::process(const slam::FrameInput& input, const InputCo
   package_.chance = recorded == nullptr ? FrameChance{} : recorded->chance;
   const FrameOutput& frame = reporter_->report(&package_, out);
   *clock = package_.clock;
-  remember(frame.result, frame.valid);
+  tally_.note(frame.result, frame.valid, package_.counts);
   return frame;
-}
-
-void Session::remember(const slam::FrameResult& published, bool valid, bool with_time) {
-  ++end_.frames;
-  end_.utime = published.utime;
-  end_.last = published;
-  if (!valid) return;
-  ++end_.frames_valid;
-  if (with_time) end_.live_utimes.push_back(published.utime);
 }
 
 const slam::FrameResult& Session::process_recorded(slam::FrameInput input, const RecordedChance& recorded) {
@@ -104,25 +95,30 @@ const RunEnd& Session::finish(const InputCounts& in) {
   estimator_.finish();
   estimator_.release_frames();
   if (config_.estimator.calibration.refine) print_calibration(estimator_.inspect().calibration());
-  end_.counts = estimator_.counts();
+  summarise_maps();
+  if (publisher_->has_logs()) publish_results(in);
+  return end();
+}
+
+void Session::summarise_maps() {
+  RunEnd& end = *tally_.mutable_end();
+  end.counts = estimator_.counts();
   const slam::Inspection maps = estimator_.inspect();
-  end_.trajectories = maps.trajectories();
-  end_.landmarks = maps.landmarks();
-  end_.unit_scale = end_.last.scale == slam::ScaleState::kAssumed ? config_.scale.assumed : 1.0;
-  end_.observation_distances.assign(end_.trajectories.size(), {});
+  end.trajectories = maps.trajectories();
+  end.landmarks = maps.landmarks();
+  end.unit_scale = end.last.scale == slam::ScaleState::kAssumed ? config_.scale.assumed : 1.0;
+  end.observation_distances.assign(end.trajectories.size(), {});
   maps.visit_observation_distances([&](std::int32_t map_id, double distance) {
-    for (std::size_t i = 0; i < end_.trajectories.size(); ++i) {
-      if (end_.trajectories[i].map_id == map_id) end_.observation_distances[i].push_back(distance);
+    for (std::size_t i = 0; i < end.trajectories.size(); ++i) {
+      if (end.trajectories[i].map_id == map_id) end.observation_distances[i].push_back(distance);
     }
   });
-  if (publisher_->has_logs()) publish_results(in);
-  return end_;
 }
 
 void Session::publish_results(const InputCounts& in) {
   publish_landmarks();
-  publisher_->publish_result(ipc::kTrajectoryChannel, end_.utime, make_trajectory(end_));
-  summary_t summary = make_summary(end_, config_);
+  publisher_->publish_result(ipc::kTrajectoryChannel, end().utime, make_trajectory(end()));
+  summary_t summary = make_summary(end(), config_);
   summary.times_backwards = in.times_backwards;
   summary.images_undecodable = in.undecodable;
   summary.images_wrong_size = in.wrong_size;
@@ -131,26 +127,27 @@ void Session::publish_results(const InputCounts& in) {
   summary.configuration_hash = names_.configuration_hash;
   summary.calibration_hash = names_.calibration_hash;
   summary.build = names_.build;
-  publisher_->publish_result(ipc::kSummaryChannel, end_.utime, summary);
+  publisher_->publish_result(ipc::kSummaryChannel, end().utime, summary);
 }
 
 void Session::publish_landmarks() {
-  const std::span<const slam::LandmarkInfo> all(end_.landmarks);
+  const std::span<const slam::LandmarkInfo> all(end().landmarks);
   const auto sightings = [this](const slam::LandmarkInfo& l) { return estimator_.inspect().sightings(l); };
   for (std::size_t first = 0; first < all.size(); first += kLandmarksAMessage) {
     const std::size_t count = std::min(kLandmarksAMessage, all.size() - first);
-    publisher_->publish_result(ipc::kLandmarksChannel, end_.utime,
-                               make_landmarks(end_, all.subspan(first, count), sightings));
+    publisher_->publish_result(ipc::kLandmarksChannel, end().utime,
+                               make_landmarks(end(), all.subspan(first, count), sightings));
   }
 }
 
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
-                                      Outputs* outputs, bool with_schedule) {
+                                      Outputs* outputs, bool with_schedule, bool keep_times) {
   const slam::Rig rig = make_rig(calibration, config.camera.index);
   outputs->set_body_is_camera(calibration.body_name.empty());
   try {
-    return std::make_unique<Session>(config, rig, calibration_hash(calibration), outputs->boot_counter(),
-                                     outputs->sinks(), outputs->publisher(), with_schedule);
+    const Session::Options options{calibration_hash(calibration), outputs->boot_counter(), with_schedule,
+                                   keep_times};
+    return std::make_unique<Session>(config, rig, options, outputs->sinks(), outputs->publisher());
   } catch (const std::invalid_argument& error) {
     throw ConfigError(std::string("configuration: ") + error.what());
   } catch (const std::bad_alloc&) {

@@ -14,6 +14,7 @@
 #include "daemon/input/counts.h"
 #include "daemon/output/frame_reporter.h"
 #include "daemon/output/messages.h"
+#include "daemon/pipeline/run_tally.h"
 #include "slam/estimator.h"
 
 namespace farpoint::daemon {
@@ -28,10 +29,16 @@ struct RecordedChance {
 
 class Session {
  public:
+  struct Options {
+    std::string calibration_hash;
+    std::int32_t boot_counter = 0;
+    bool with_schedule = false;  // FARPOINT_SCHEDULE is published too
+    bool keep_times = true;      // see RunTally
+  };
   // Allocates the estimator's memory. `sinks` and the publisher must outlive the session. Throws
   // std::invalid_argument where configuration and rig cannot work together.
-  Session(const Config& config, const slam::Rig& rig, std::string calibration_hash, std::int32_t boot_counter,
-          std::vector<PoseSink*> sinks, Publisher* publisher, bool with_schedule);
+  Session(const Config& config, const slam::Rig& rig, Options options, std::vector<PoseSink*> sinks,
+          Publisher* publisher);
 
   // Tracks one image, maps, and hands the outcome to every sink: in lockstep, or as `recorded` tells. `clock`
   // holds what the caller measured of this frame (the decoding) and gets the rest.
@@ -41,13 +48,12 @@ class Session {
   // The parts of process(), for threads of their own.
   [[nodiscard]] slam::Estimator& estimator() { return estimator_; }
   [[nodiscard]] FrameReporter& reporter() { return *reporter_; }
-  // Keeps what the end of the run is summarised from; with_time: the times of valid frames, which grow.
-  void remember(const slam::FrameResult& published, bool valid, bool with_time = true);
+  [[nodiscard]] RunTally& tally() { return tally_; }
 
   // Finishes mapping's queue, and publishes the final trajectory and the summary.
   const RunEnd& finish(const InputCounts& in);
   // What is known without that.
-  [[nodiscard]] const RunEnd& end() const { return end_; }
+  [[nodiscard]] const RunEnd& end() const { return tally_.end(); }
 
   [[nodiscard]] std::size_t pool_bytes() const { return pool_bytes_; }
 
@@ -55,6 +61,7 @@ class Session {
   const slam::FrameResult& process_recorded(slam::FrameInput input, const RecordedChance& recorded);
   void publish_results(const InputCounts& in);
   void publish_landmarks();
+  void summarise_maps();
 
   Config config_;
   FrameReporter::Names names_;
@@ -64,12 +71,13 @@ class Session {
   Publisher* publisher_;
   std::unique_ptr<FrameReporter> reporter_;
   FramePackage package_;  // of process()
-  RunEnd end_;
+  RunTally tally_;
 };
 
 // A session for the rig of `calibration` (see the constructor). Throws InputError where the calibration
 // cannot be used, ConfigError where the configuration cannot or wants more memory than there is.
 [[nodiscard]] std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
-                                                    Outputs* outputs, bool with_schedule);
+                                                    Outputs* outputs, bool with_schedule,
+                                                    bool keep_times = true);
 
 }  // namespace farpoint::daemon

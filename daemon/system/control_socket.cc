@@ -33,6 +33,15 @@ void limit_waiting(int fd, int milliseconds) {
   setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
 }
 
+// Removes the socket of a killed daemon. Anything else at this path is left as it is.
+void remove_old_socket(const std::string& path) {
+  struct stat found {};
+  if (lstat(path.c_str(), &found) != 0) return;
+  if (!S_ISSOCK(found.st_mode))
+    throw std::runtime_error(path + ": not a socket, expected none or the socket of a killed farpointd");
+  unlink(path.c_str());
+}
+
 // An answer means another daemon, which keeps its socket.
 bool is_alive(const sockaddr_un& address) {
   const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
@@ -46,7 +55,7 @@ bool is_alive(const sockaddr_un& address) {
 ControlSocket::ControlSocket(const std::string& path) : path_(path) {
   const sockaddr_un address = address_of(path);
   if (is_alive(address)) throw std::runtime_error(path + ": another farpointd answers there");
-  unlink(path.c_str());
+  remove_old_socket(path);
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const bool bound = fd_ >= 0 && bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   if (bound && chmod(path.c_str(), kOwnerAndGroup) == 0 && listen(fd_, 4) == 0) return;

@@ -10,8 +10,8 @@ namespace farpoint::daemon {
 
 class ControlSocket {
  public:
-  // Throws std::runtime_error if the socket cannot be created. Replaces the socket of a killed daemon. Owner
-  // and group may connect.
+  // Throws std::runtime_error if the socket cannot be created. Replaces the socket of a killed daemon; never
+  // removes anything else. Owner and group may connect.
   explicit ControlSocket(const std::string& path);
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;

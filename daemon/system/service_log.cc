@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <stdexcept>
 
 namespace farpoint::daemon {
 namespace {
@@ -59,8 +60,7 @@ spdlog::sink_ptr make_file_sink(const LogConfig& config) {
     sink->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
     return sink;
   } catch (const spdlog::spdlog_ex& error) {
-    throw ConfigError("configuration: log.file: " + config.file + ": " + error.what() +
-                      ", expected a file that can be written, or none");
+    throw std::runtime_error(config.file + ": " + error.what() + ", expected a file that can be written");
   }
 }
 
@@ -90,20 +90,28 @@ class DefaultStack {
 }  // namespace
 
 void start_service_log(const LogConfig& config) {
-  std::vector<spdlog::sink_ptr> sinks{make_stream_sink()};
-  if (config.file != "none") sinks.push_back(make_file_sink(config));
   const DefaultStack stack(kLogStackBytes);
   spdlog::init_thread_pool(kQueue, 1, [] { pthread_setname_np(pthread_self(), "fp-log"); });
-  auto logger = std::make_shared<spdlog::async_logger>(
-      "farpointd", std::make_shared<RateLimitedSink>(std::move(sinks)), spdlog::thread_pool(),
-      spdlog::async_overflow_policy::overrun_oldest);
+  auto sink = std::make_shared<RateLimitedSink>(std::vector<spdlog::sink_ptr>{make_stream_sink()});
+  auto logger = std::make_shared<spdlog::async_logger>("farpointd", std::move(sink), spdlog::thread_pool(),
+                                                       spdlog::async_overflow_policy::overrun_oldest);
   logger->set_level(spdlog::level::from_str(config.level));
   logger->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(logger));
 }
 
+void open_log_file(const LogConfig& config) {
+  const auto sink = std::dynamic_pointer_cast<RateLimitedSink>(spdlog::default_logger()->sinks().front());
+  if (sink != nullptr) sink->add(make_file_sink(config));
+}
+
 void stop_service_log() {
   spdlog::shutdown();
+}
+
+void RateLimitedSink::add(spdlog::sink_ptr sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sinks_.push_back(std::move(sink));
 }
 
 void RateLimitedSink::sink_it_(const spdlog::details::log_msg& message) {

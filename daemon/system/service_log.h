@@ -12,8 +12,11 @@
 
 namespace farpoint::daemon {
 
-// Replaces the log of start_logging(). Throws ConfigError if the file cannot be written.
+// Replaces the log of start_logging(). Without the file: see open_log_file().
 void start_service_log(const LogConfig& config);
+// Any thread, once: log lines go to the rotating file too. Throws std::runtime_error if it cannot be written.
+// Precondition: the service's log runs, and config.file names a file.
+void open_log_file(const LogConfig& config);
 // Writes the remaining messages.
 void stop_service_log();
 
@@ -23,6 +26,9 @@ class RateLimitedSink final : public spdlog::sinks::base_sink<std::mutex> {
  public:
   static constexpr double kBurst = 100.0, kPerSecond = 10.0;
   explicit RateLimitedSink(std::vector<spdlog::sink_ptr> sinks) : sinks_(std::move(sinks)) {}
+
+  // Any thread.
+  void add(spdlog::sink_ptr sink);
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Input that nobody meant to give: what is intact is still delivered and counted, and what is then called
+// Damaged input: what is intact is still delivered and counted, and what is then called
 // valid is right. The camera of the synthetic log moves evenly along a line and does not turn, so that a pose
 // is right when it lies where the others of its map say.
 #include <gtest/gtest.h>

@@ -38,8 +38,8 @@ class FilmCamera final : public drivers::Camera {
     away_from_s_ = from_s;
     away_to_s_ = to_s;
   }
-  // As one shutter for both: image n of the other is taken with image n of this one, but for `later_us`, and
-  // what is due while it is away never comes.
+  // One shutter for both: image n of the other is taken `later_us` after image n of this one. Images due while
+  // a camera is away never come.
   void share_shutter_with(FilmCamera* other, std::int64_t later_us) {
     other->shutter_ = shutter_ = std::make_shared<std::atomic<double>>(-1.0);
     other->later_us_ = later_us;
@@ -104,6 +104,7 @@ class LiveRunTest : public testing::Test {
         silent_.push_back(f);
       } else {
         last_seen_ = f;
+        last_seen_state_ = f.result.state;
         ++frames_;
       }
     };
@@ -115,7 +116,7 @@ class LiveRunTest : public testing::Test {
                                        << further;
   }
 
-  // Runs until `enough` says so, then as SIGTERM ends it.
+  // Runs until `enough` returns true, then ends the run by SIGTERM.
   int run(const std::function<bool()>& enough) {
     LiveEnvironment environment;
     environment.camera = std::move(camera_);
@@ -153,8 +154,9 @@ class LiveRunTest : public testing::Test {
   ThreadHooks hooks_;
   std::unique_ptr<FilmCamera> camera_ = std::make_unique<FilmCamera>(), second_camera_;
   std::atomic<int> frames_{0};
-  FrameOutput last_seen_;            // output's thread, read after the run
-  std::vector<FrameOutput> silent_;  // the same
+  FrameOutput last_seen_;  // output's thread, read after the run
+  std::atomic<slam::State> last_seen_state_{slam::State::kStarting};
+  std::vector<FrameOutput> silent_;  // output's thread, read after the run
   double stopped_s_ = 0, stop_took_s_ = 0;
   std::string printed_;
 };

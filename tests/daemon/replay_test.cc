@@ -300,7 +300,7 @@ TEST_F(SyntheticRun, StandardInputGivesTheSame) {
   expect_same(comparable(path("stdin.lcm")), comparable(path("file.lcm")), "output log");
 }
 
-// All but the last image has gone into the pipe when the signal comes. Pipe and reader hold 3 MB, the log is
+// The last image is not in the pipe yet when the signal comes. Pipe and reader hold 3 MB, the log is
 // larger: the run is well under way then.
 TEST_F(SyntheticRun, ASignalEndsItInOrder) {
   const std::size_t bytes = test::read_bytes(log_path()).size();
@@ -367,7 +367,7 @@ TEST_F(SyntheticRun, WrongImagesAreDroppedAndCounted) {
       image_t image = test::synthetic_image({}, i);
       if (i == 3) image.utime -= 250'000;      // runs backwards
       if (i == 4) image.width = 481;           // not the calibration's
-      if (i == 5) image.pixel_format = 12345;  // nobody's
+      if (i == 5) image.pixel_format = 12345;  // no format
       if (i == 6) image.camera = 3;            // not its channel's
       writer.write_message("CAMERA_0", 0, image);
       if (i == 7) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kWidth_px = 480, kHeight_px = 320;
 constexpr double kFocal_px = 400.0;
-constexpr int kCells = 5;  // texture of a square: so many cells a side
+constexpr int kCells = 5;  // of a square's texture, a side
 constexpr std::int64_t kStart_us = 1'000'000;
 
 struct Square {

@@ -19,7 +19,7 @@ FILES = {
     "usr/lib/systemd/system/farpointd.service", "usr/lib/sysusers.d/farpoint.conf", "usr/lib/tmpfiles.d/farpoint.conf",
     "usr/lib/udev/rules.d/60-farpoint.rules", "usr/lib/systemd/network/80-farpoint-lcm.network",
     "usr/lib/farpoint/farpoint_ceres.so", "usr/share/doc/farpoint/copyright", "usr/share/doc/farpoint/changelog.gz",
-    "usr/share/doc/farpoint/daemon.md",
+    "usr/share/doc/farpoint/daemon.md", "usr/share/doc/farpoint/systemd.md",
     "usr/share/doc/farpoint/examples/80-farpoint-can.network",
 }
 

@@ -7,12 +7,14 @@ counts), and the exposure is at most 2.0. Status 77 where there is no systemd-an
 """
 
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 
 MAX_EXPOSURE = 20  # tenths
+HIGHEST_PRIORITY = 50  # of capture: daemon/system/core_plan.cc
 
 
 def main():
@@ -24,8 +26,12 @@ def main():
         # Verified as installed, but with the program where it is now.
         copy = pathlib.Path(folder) / unit.name
         text = unit.read_text()
-        if "ExecStart=/usr/bin/farpointd\n" not in text:
-            print("unit_test.py: the unit does not start /usr/bin/farpointd")
+        if "ExecStart=/usr/bin/farpointd --set realtime.profile=vehicle\n" not in text:
+            print("unit_test.py: the unit does not start /usr/bin/farpointd with a vehicle's priorities and cores")
+            return 1
+        limit = re.search(r"^LimitRTPRIO=(\d+)$", text, re.MULTILINE)
+        if limit is None or int(limit.group(1)) < HIGHEST_PRIORITY:
+            print(f"unit_test.py: LimitRTPRIO is below {HIGHEST_PRIORITY}, which the profile 'vehicle' asks for")
             return 1
         copy.write_text(text.replace("/usr/bin/farpointd", program))
         verify = subprocess.run(["systemd-analyze", "verify", str(copy)], capture_output=True, text=True)

@@ -50,7 +50,7 @@ class Listener {
   Listener(const std::string& url, Board* board) : lcm_(lcm_create(url.c_str())) {
     if (lcm_ == nullptr) {
       throw RunError("cannot listen on " + url +
-                     ", expected an LCM URL and a multicast route (ip route add 224.0.0.0/4 dev lo)");
+                     ", expected an LCM URL and a multicast route (ip route add 239.255.76.67/32 dev lo)");
     }
     lcm_subscribe(lcm_, ipc::kOdometryChannel, take<odometry_t>, board);
     lcm_subscribe(lcm_, ipc::kStatusChannel, take<status_t>, board);

@@ -21,7 +21,7 @@ for name in $(cat $root/names); do
     dpkg -P farpoint
   fi > /dev/null 2>&1
   ip link delete vcan0 2> /dev/null
-  ip route delete 224.0.0.0/4 dev lo 2> /dev/null
+  ip route delete 239.255.76.67/32 dev lo 2> /dev/null
   sleep 0.5
   for module in v4l2loopback vivid vimc uvcvideo vhci-hcd sch_tbf vcan kvaser_pci; do rmmod $module 2> /dev/null; done
   rm -rf /tmp/*

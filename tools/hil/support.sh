@@ -201,7 +201,7 @@ install_package() {
   write_configuration /etc/farpoint/farpoint.yaml /run/farpoint/control "$1" /etc/farpoint/camera.yaml
   install -m 644 /tmp/camera.yaml /etc/farpoint/camera.yaml
 }
-has_lcm_route() { ip route | grep -q 224.0.0.0/4; }
+has_lcm_route() { ip route | grep -q "^239\.255\.76\.67 "; }
 
 # The package, a loopback camera, and LCM's route, which a running networkd sets; the service is not started.
 install_service() {

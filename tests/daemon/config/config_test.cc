@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <fstream>
 #include <iomanip>
+#include <set>
 #include <sstream>
+#include <vector>
+
 #include "tests/support/paths.h"
 
 namespace farpoint::daemon {
@@ -109,6 +112,49 @@ TEST(ConfigKeys, DefaultsLieInTheirRanges) {
   for (const ConfigKey& key : config_keys()) {
     if (key.type == KeyType::kChoice || key.type == KeyType::kText) continue;
     EXPECT_EQ(error_of_setting(key.name + "=" + key.get(Config{})), "") << key.name;
+  }
+}
+
+// A table as a later version may have it.
+const std::vector<DroppedKey> kDropped = {
+    {"tracking.old_radius_px", "tracking.prior_search_px"}, {"lcm.verbose", ""}, {"stereo.rate_hz", ""}};
+
+TEST(DroppedKeys, AKeptFileStartsWithAWarningThatNamesEachAndItsHeir) {
+  Config config;
+  ConfigOrigins origins;
+  std::vector<std::string> warnings;
+  load_config_text(
+      "tracking:\n  old_radius_px: 12\n  min_inliers: 31\nlcm:\n  verbose: true\nstereo:\n  rate_hz: 10\n",
+      "f.yaml", &config, &origins, &warnings, kDropped);
+  EXPECT_EQ(config.estimator.tracking.min_inliers, 31);
+  EXPECT_EQ(warnings, (std::vector<std::string>{
+                          "f.yaml:2: tracking.old_radius_px: no key of this version, passed over; set "
+                          "tracking.prior_search_px instead",
+                          "f.yaml:5: lcm.verbose: no key of this version, passed over",
+                          "f.yaml:6: stereo: no key of this version, passed over"}));
+}
+
+TEST(DroppedKeys, AKeyThatNeverWasStillStopsTheStart) {
+  Config config;
+  ConfigOrigins origins;
+  std::vector<std::string> warnings;
+  EXPECT_THROW(
+      load_config_text("tracking:\n  old_radius: 12\n", "f.yaml", &config, &origins, &warnings, kDropped),
+      ConfigError);
+  EXPECT_THROW(
+      load_config_text("stereos:\n  rate_hz: 12\n", "f.yaml", &config, &origins, &warnings, kDropped),
+      ConfigError);
+  EXPECT_TRUE(warnings.empty());
+}
+
+TEST(DroppedKeys, NoneIsAKeyOfThisVersionAndEachHeirIs) {
+  std::set<std::string> names;
+  for (const ConfigKey& key : config_keys()) names.insert(key.name);
+  for (const DroppedKey& key : dropped_keys()) {
+    EXPECT_FALSE(names.contains(key.name)) << key.name;
+    if (!key.heir.empty()) {
+      EXPECT_TRUE(names.contains(key.heir)) << key.heir;
+    }
   }
 }
 

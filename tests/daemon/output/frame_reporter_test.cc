@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "daemon/system/side_functions.h"
 #include "ipc/channels.h"
 #include "tests/daemon/output/published.h"
 
@@ -103,6 +104,22 @@ TEST_F(FrameReporterTest, TheStatusHasTheCountsOfEstimatorMappingAndInput) {
   EXPECT_EQ(s.wheels_invalid, 7);
   EXPECT_EQ(s.capture_queue, 3);
   EXPECT_NE(s.message, "");
+}
+
+TEST_F(FrameReporterTest, TheStatusHasTheCountsOfTheOutputs) {
+  FramePackage p = package(0, 0, 0);
+  OutputCounts out;
+  out.can_send_errors = 2, out.can_received = 3, out.can_not_logged = 4;
+  out.side_missing = 1 << static_cast<int>(SideFunction::kRecording) | 1, out.side_failures = 6;
+  reporter_.report(&p, out);
+  const auto status = kept_.of<status_t>(ipc::kStatusChannel);
+  ASSERT_EQ(status.size(), 1U);
+  EXPECT_EQ(status[0].can_send_errors, 2);
+  EXPECT_EQ(status[0].can_received, 3);
+  EXPECT_EQ(status[0].log_write_errors, 4);
+  EXPECT_EQ(status[0].side_missing,
+            std::int32_t{status_t::SIDE_RECORDING} + std::int32_t{status_t::SIDE_LCM});
+  EXPECT_EQ(status[0].side_failures, 6);
 }
 
 TEST_F(FrameReporterTest, TheScheduleSaysWhatTheFrameTookAndMet) {

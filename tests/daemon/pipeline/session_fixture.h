@@ -21,8 +21,9 @@ class SessionFixture : public ::testing::Test {
     config_.realtime.least_features = 200;
     config_.realtime.capture_queue = 3;
     publisher_.add(std::make_unique<test::KeptMessageSink>(&kept_));
-    session_ = std::make_unique<Session>(config_, make_rig(test::synthetic_calibration(), 0), "calibration",
-                                         7, std::vector<PoseSink*>{&sink_}, &publisher_, true);
+    session_ = std::make_unique<Session>(config_, make_rig(test::synthetic_calibration(), 0),
+                                         Session::Options{"calibration", 7, true},
+                                         std::vector<PoseSink*>{&sink_}, &publisher_);
   }
   [[nodiscard]] static ipc::GreyImage grey(int number) {
     const image_t image = test::synthetic_image({}, number);

@@ -17,9 +17,10 @@ class SessionTest : public SessionFixture {
     return session_->process(
         {1'000'000 + number * 100'000, number, 0,
          slam::ImageView{image_.data(), image_.width_px, image_.height_px, image_.width_px}},
-        in, {}, recorded, &clock_);
+        in, out_, recorded, &clock_);
   }
 
+  OutputCounts out_;
   ipc::GreyImage image_;
   StageClock clock_;
 };
@@ -32,32 +33,56 @@ TEST_F(SessionTest, HandsEachFrameToTheSinksOnceAndInOrder) {
   EXPECT_GT(clock_.wall_ms(timing_t::STAGE_FRAME), 0.0);
 }
 
-TEST_F(SessionTest, TheEndCountsFramesAndKeepsTheTimesOfValidOnes) {
-  for (int i = 0; i < 3; ++i) process(i);
-  slam::FrameResult valid;
-  valid.utime = 5'000'000;
-  session_->remember(valid, true);
-  session_->remember(valid, true, false);
-  session_->remember(valid, false);
+TEST_F(SessionTest, TheEndIsKnownFromTheFramesAlone) {
+  for (int i = 0; i < 30; ++i) process(i);
   const RunEnd& end = session_->end();
-  EXPECT_EQ(end.frames, 6);
-  EXPECT_EQ(end.frames_valid, 2);
-  EXPECT_EQ(end.live_utimes, std::vector<std::int64_t>{5'000'000});
-  EXPECT_EQ(end.utime, 5'000'000);
+  EXPECT_EQ(end.frames, 30);
+  EXPECT_EQ(end.first_utime, 1'000'000);
+  EXPECT_EQ(end.utime, 3'900'000);
+  EXPECT_EQ(end.counts.frames, 30U);
+  EXPECT_EQ(end.counts.maps, 1U);
+  EXPECT_GT(end.initialised_utime, 1'000'000);
+  EXPECT_LT(end.initialised_utime, 3'900'000);
+  EXPECT_EQ(end.live_utimes.size(), static_cast<std::size_t>(end.frames_valid));
+}
+
+TEST_F(SessionTest, TheStatusHoldsTheCountsOfInputsAndOutputsAsOfTheFrame) {
+  for (int i = 0; i < 12; ++i) {
+    out_.can_send_errors = 100 + i;
+    process(i);
+  }
+  const auto statuses = kept_.of<status_t>(ipc::kStatusChannel);
+  ASSERT_GE(statuses.size(), 3U);
+  for (const status_t& status : statuses) {
+    const std::int64_t number = (status.utime - 1'000'000) / 100'000;
+    EXPECT_EQ(status.frames_received, number + 1);
+    EXPECT_EQ(status.can_send_errors, 100 + number);
+    EXPECT_EQ(status.frames_tracked, number + 1);
+    EXPECT_EQ(status.boot_counter, 7);
+  }
+}
+
+TEST_F(SessionTest, TheMapIsPublishedWithAFrameThatHasTakenIt) {
+  for (int i = 0; i < 30; ++i) process(i);
+  EXPECT_FALSE(kept_.of<map_t>(ipc::kMapChannel).empty());
 }
 
 TEST_F(SessionTest, FinishPublishesTheRunsResultsWithWhatWasRefused) {
-  for (int i = 0; i < 30; ++i) process(i);
+  for (int i = 0; i < 80; ++i) process(i);
   InputCounts in;
   in.times_backwards = 4, in.undecodable = 5;
   const RunEnd& end = session_->finish(in);
-  EXPECT_EQ(end.counts.frames, 30U);
+  EXPECT_EQ(end.counts.frames, 80U);
   EXPECT_GT(end.counts.mapping.keyframes_made, 1U);
   EXPECT_EQ(end.landmarks.size(), end.counts.landmarks);
   EXPECT_EQ(kept_.of<trajectory_t>(ipc::kTrajectoryChannel).size(), 1U);
-  std::size_t published = 0;
-  for (const landmarks_t& m : kept_.of<landmarks_t>(ipc::kLandmarksChannel)) published += m.landmarks.size();
-  EXPECT_GT(published, 50U);
+  std::vector<double> published, expected;
+  for (const landmarks_t& m : kept_.of<landmarks_t>(ipc::kLandmarksChannel))
+    for (const landmark_t& l : m.landmarks) published.push_back(l.distance);
+  for (const slam::LandmarkInfo& l : end.landmarks)
+    if (l.full && l.inverse_depth > 0.0) expected.push_back(1.0 / l.inverse_depth);
+  EXPECT_GT(end.landmarks.size(), 500U) << "in several messages";
+  EXPECT_EQ(published, expected);
   const auto summary = kept_.of<summary_t>(ipc::kSummaryChannel);
   ASSERT_EQ(summary.size(), 1U);
   EXPECT_EQ(summary[0].times_backwards, 4);

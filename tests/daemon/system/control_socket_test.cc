@@ -2,10 +2,13 @@
 #include "daemon/system/control_socket.h"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
 #include <thread>
 
 #include "tests/ipc/scratch.h"
@@ -38,25 +41,53 @@ TEST(ControlSocket, AnswersAndIsForOwnerAndGroup) {
     EXPECT_EQ(status.st_mode & 0777, 0660U);
     EXPECT_EQ(ask_and_serve(&socket, path, "status"), "ok status");
     EXPECT_EQ(ask_and_serve(&socket, path, "again"), "ok again");
-    socket.serve([](const std::string&) -> std::string { throw std::logic_error("nobody asked"); });
+    socket.serve([](const std::string&) -> std::string { throw std::logic_error("no request"); });
   }
   EXPECT_NE(access(path.c_str(), F_OK), 0);  // gone with the daemon
 }
 
-TEST(ControlSocket, WhatAKilledDaemonLeftIsReplacedAndALiveOneIsNot) {
-  const test::Scratch scratch;
-  const std::string path = scratch.path("control");
-  test::write_bytes(path, {1});
-  ControlSocket socket(path);
-  try {
-    ControlSocket second(path);
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(std::string(error.what()), path + ": another farpointd answers there");
-  }
+// A socket at this path without a daemon.
+void leave_socket(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+  ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  close(fd);
 }
 
-TEST(ControlSocket, NobodyThereIsSaid) {
+std::string refusal(const std::string& path) {
+  try {
+    ControlSocket socket(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ControlSocket, TheSocketOfAKilledDaemonIsReplacedAndThatOfALiveOneIsNot) {
+  const test::Scratch scratch;
+  const std::string path = scratch.path("control");
+  leave_socket(path);
+  ControlSocket socket(path);
+  EXPECT_EQ(refusal(path), path + ": another farpointd answers there");
+}
+
+TEST(ControlSocket, NothingButASocketIsRemoved) {
+  const test::Scratch scratch;
+  const std::string file = scratch.path("file"), link = scratch.path("link"), folder = scratch.path("folder");
+  test::write_bytes(file, {1, 2, 3});
+  leave_socket(scratch.path("other"));
+  std::filesystem::create_symlink(scratch.path("other"), link);
+  std::filesystem::create_directory(folder);
+  for (const std::string& path : {file, link, folder})
+    EXPECT_EQ(refusal(path), path + ": not a socket, expected none or the socket of a killed farpointd");
+  EXPECT_EQ(test::read_bytes(file), (std::vector<std::uint8_t>{1, 2, 3}));
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_TRUE(std::filesystem::is_directory(folder));
+}
+
+TEST(ControlSocket, WithoutADaemonTheClientSaysWhatItExpected) {
   const test::Scratch scratch;
   try {
     (void)ask_daemon(scratch.path("none"), "status");

@@ -54,6 +54,7 @@ TEST(ServiceLog, GoesToItsFileWithTimeAndLevel) {
   config.file = scratch.path("farpointd.log");
   testing::internal::CaptureStderr();
   start_service_log(config);
+  open_log_file(config);
   spdlog::warn("the camera is gone");
   spdlog::debug("not of this level");
   stop_service_log();
@@ -65,10 +66,24 @@ TEST(ServiceLog, GoesToItsFileWithTimeAndLevel) {
   EXPECT_EQ(text.str().find("not of this level"), std::string::npos);
 }
 
-TEST(ServiceLog, AFileThatCannotBeWrittenIsAMistakeOfTheConfiguration) {
+TEST(ServiceLog, AFileThatCannotBeWrittenNowMayBeOpenedLater) {
+  const test::Scratch scratch;
   LogConfig config;
   config.file = "/proc/nowhere/x.log";
-  EXPECT_THROW(start_service_log(config), ConfigError);
+  testing::internal::CaptureStderr();
+  start_service_log(config);
+  EXPECT_THROW(open_log_file(config), std::runtime_error);
+  spdlog::warn("before");
+  config.file = scratch.path("farpointd.log");
+  open_log_file(config);
+  spdlog::warn("after");
+  stop_service_log();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "farpointd: warning: before\nfarpointd: warning: after\n");
+  start_logging("warning");  // for the tests that follow
+  std::stringstream text;
+  text << std::ifstream(config.file).rdbuf();
+  EXPECT_NE(text.str().find(" warning after\n"), std::string::npos) << text.str();
 }
 
 }  // namespace

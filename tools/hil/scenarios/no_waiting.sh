@@ -10,7 +10,7 @@ frames=3100
 loopback
 modprobe -a vcan can-raw || fail "no vcan"
 ip link add vcan0 type vcan && ip link set up vcan0 || fail "no vcan0"
-ip route add 224.0.0.0/4 dev lo && ip link set lo multicast on || fail "no route for LCM"
+ip route add 239.255.76.67/32 dev lo && ip link set lo multicast on || fail "no route for LCM"
 start_playing $frames
 start_daemon --set can.enabled=true --set can.interface=vcan0 --set can.rate_hz=50 --set lcm.enabled=true
 unset LD_PRELOAD
