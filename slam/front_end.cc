@@ -301,7 +301,7 @@ void FrontEnd::release_frames() {
   intake_.release();
 }
 
-// --- what is told of the frame
+// --- the result of a frame
 
 RecordedFrame FrontEnd::relative_to_reference(const Frame& frame, const TrackOutcome& outcome) const {
   return {frame.utime, map_id_, tracker_.view()->reference_id,
