@@ -37,10 +37,11 @@ std::size_t Tracker::bytes() const {
          capacity_bytes(last_seen_) + capacity_bytes(confirmed_seen_);
 }
 
-void Tracker::set_view(std::shared_ptr<const LocalView> view) {
-  if (matcher_.view()) motion_.correct(*matcher_.view(), *view);
+double Tracker::set_view(std::shared_ptr<const LocalView> view) {
+  const double scale = matcher_.view() ? motion_.correct(*matcher_.view(), *view) : 1.0;
   matcher_.set_view(std::move(view));
   matcher_.mark_seen(last_seen_);
+  return scale;
 }
 
 void Tracker::adopt(std::shared_ptr<const LocalView> view, std::span<const LandmarkHandle> seen) {

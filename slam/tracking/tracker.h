@@ -36,8 +36,9 @@ class Tracker {
   // frames.
   void use_motion_model(const MotionModel* model) { motion_model_ = model; }
 
-  // Takes a newer view. Pose and motion prior follow the newest keyframe that both views contain.
-  void set_view(std::shared_ptr<const LocalView> view);
+  // Takes a newer view. Pose and motion prior follow the newest keyframe that both views contain, in the unit
+  // of the newer view. Returns the change of unit (ConstantVelocity::correct); 1 for the first view.
+  double set_view(std::shared_ptr<const LocalView> view);
   [[nodiscard]] const LocalView* view() const { return matcher_.view().get(); }
   [[nodiscard]] std::shared_ptr<const LocalView> shared_view() const { return matcher_.view(); }
   // Takes another tracker's view and the landmarks that its newest frame saw, for track_from(). Null lets go

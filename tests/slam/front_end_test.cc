@@ -125,6 +125,69 @@ TEST_F(FrontEndTest, AMotionOverLostFramesIsCarriedOnceTheMapTellsIt) {
   EXPECT_EQ(back.reset_counter, 1U);
 }
 
+// --- another unit
+
+class FrontEndOfARescaledMap : public FrontEndTest {
+ protected:
+  const Sim3 S_{2.0, so3_exp({0.0, 0.1, 0.9}), {3, -2, 1}};
+
+  // Tracks until a keyframe is under way to mapping, and rescales the map before it arrives.
+  void rescale_at_a_keyframe() {
+    ASSERT_TRUE(run_until_tracking());
+    while (!front_end_.track(drive_.next(), TakeLimit{}).keyframe) finish_frame();
+    back_end_.transform_map(1, S_);
+    before_ = finish_frame();
+  }
+  const FrameResult& finish_frame() {
+    work();
+    return front_end_.take_replies_at_once();
+  }
+
+  FrameResult before_;  // the last frame in the old unit
+};
+
+TEST_F(FrontEndOfARescaledMap, OdomKeepsItsUnitAndMapFromOdomTakesTheNewOne) {
+  rescale_at_a_keyframe();
+  ASSERT_EQ(before_.map_from_odom.scale, 1.0);
+  const Vector6d velocity = before_.velocity_body;
+  FrameResult last = before_;
+  int rescaled = 0;
+  for (int i = 0; i < 40; ++i) {
+    const FrameResult now = run(drive_.next());
+    ASSERT_TRUE(is_valid(now.state)) << i;
+    const SE3 by_odom = last.T_odom_body.inverse() * now.T_odom_body;
+    EXPECT_NEAR(by_odom.t.norm() / (0.1 * velocity.head<3>().norm()), 1.0, 0.1) << i;
+    EXPECT_LT((now.velocity_body - velocity).norm(), 0.1 * velocity.norm()) << i;
+    EXPECT_LT((now.map_from_odom * now.T_odom_body).boxminus_to(now.T_map_body).norm(), 1e-9) << i;
+    rescaled += now.map_from_odom.scale == 2.0 ? 1 : 0;
+    last = now;
+  }
+  EXPECT_GE(rescaled, 30);
+  EXPECT_EQ(last.reset_counter, 1U);
+  EXPECT_EQ(front_end_.counts().lost, 0U);
+  // The frames in the old unit lie where the whole map went.
+  EXPECT_LT((last.map_from_odom * SE3{}).boxminus_to(S_ * (before_.map_from_odom * SE3{})).norm(), 0.1);
+}
+
+// Poses relative to keyframes: those recorded before, those under way, and the keyframe itself.
+TEST_F(FrontEndOfARescaledMap, RecordedFramesAndKeyframesUnderWayFollow) {
+  rescale_at_a_keyframe();
+  const std::int64_t first_utime = before_.utime;
+  for (int i = 0; i < 40; ++i) run(drive_.next());
+  back_end_.collect_recorded();
+  const Map& map = back_end_.mapper().map();
+  std::vector<SE3> poses;
+  for (const KeptFrame& frame : back_end_.recorded()) {
+    Sim3 S_world_reference;
+    ASSERT_TRUE(map.similarity_of(frame.reference_id, &S_world_reference));
+    if (frame.utime >= first_utime - 2'000'000) poses.push_back(S_world_reference * frame.T_reference_body());
+  }
+  ASSERT_GT(poses.size(), 50U);
+  const double step = (poses[1].t - poses[0].t).norm();
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    EXPECT_NEAR((poses[i].t - poses[i - 1].t).norm() / step, 1.0, 0.1) << i;
+}
+
 TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
   ASSERT_TRUE(run_until_tracking());
   for (int i = 0; i < 30; ++i) run(drive_.next());

@@ -268,6 +268,35 @@ TEST_F(TrackerTest, FollowsItsKeyframeIntoANewerView) {
   EXPECT_LT(error_of(out.T_world_body, moved * drive(3)), 1e-3);
 }
 
+// Another unit and other axes between two frames. Without a lever arm: it would not change its length.
+TEST_F(TrackerTest, FollowsAMapThatIsDoubledAndTurnedBetweenTwoFrames) {
+  scene.rig.cameras[0].T_body_camera.t.setZero();
+  start();
+  for (const int n : {1, 2, 3}) track_and_accept(n);
+  const Vector6d velocity = tracker.velocity_body();
+  const Sim3 S{2.0, so3_exp({0.1, 0.2, 0.9}), {3, -2, 1}};
+  for (ScenePoint& p : scene.points) p.position_w = S * p.position_w;
+  scene.T_world_reference = S * scene.T_world_reference;
+  const auto view = scene.view();
+  view->reference_scale = 2.0;
+  view->keyframes = {{3, S * TrackingScene::pose({-2, 0, 0}), 2.0}, {7, scene.T_world_reference, 2.0}};
+  EXPECT_EQ(tracker.set_view(view), 2.0);
+  EXPECT_LT(error_of(tracker.T_world_body(), S * drive(3)), 2e-3);
+  EXPECT_LT((tracker.velocity_body().head<3>() - 2.0 * velocity.head<3>()).norm(), 1e-12);
+  // The prior hits: the first attempt finds the landmarks that the last frame saw, in the smallest window.
+  scene.add_doubles();
+  tracker.set_view(view);
+  for (const int n : {4, 5, 6}) {
+    shown = scene.look(S * drive(n), n * kFrame_us);
+    const TrackOutcome out = tracker.track(*shown.frame);
+    ASSERT_TRUE(out.ok) << n;
+    EXPECT_LT(error_of(out.T_world_body, S * drive(n)), 2e-3) << n;
+    EXPECT_GT(out.inliers, 150) << n;
+    tracker.accept(*shown.frame, out);
+  }
+  EXPECT_LT((tracker.velocity_body().head<3>() - 2.0 * velocity.head<3>()).norm(), 0.05);
+}
+
 TEST_F(TrackerTest, PosesFramesOfAnotherTrackerWithoutMovingItself) {
   start();
   track_and_accept(1);
