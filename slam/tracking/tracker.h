@@ -49,9 +49,13 @@ class Tracker {
   void start(const SE3& T_world_body, std::int64_t utime);
 
   // Pose of the frame from the motion prior: first from the last frame's landmarks, then from the local map.
+  // The prior's information weighs beside the images'.
   TrackOutcome track(const Frame& frame);
   // The same from a given prior; leaves the accepted poses alone.
-  TrackOutcome track_from(const Frame& frame, const SE3& T_world_body_prior);
+  TrackOutcome track_from(const Frame& frame, const PosePrior& prior);
+  TrackOutcome track_from(const Frame& frame, const SE3& T_world_body_prior) {
+    return track_from(frame, PosePrior{T_world_body_prior, Matrix6d::Zero()});
+  }
   // Pose of a frame after frames without one, from the last confirmed motion (Relocaliser). Not ok where the
   // landmarks found contradict each other.
   TrackOutcome relocalise(const Frame& frame);
@@ -78,7 +82,7 @@ class Tracker {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  bool coarse_pose(const Frame& frame, SE3* T_world_body);
+  bool coarse_pose(const Frame& frame, const PosePrior& prior, SE3* T_world_body);
   [[nodiscard]] bool explains_matches(const PoseSolution& solution) const;
   void note_seen();
 

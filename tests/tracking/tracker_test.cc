@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -135,6 +136,32 @@ TEST_F(TrackerTest, StartsFromTheMotionModelItIsGiven) {
   EXPECT_EQ(model.asked_utime, 3 * kFrame_us);
   tracker.use_motion_model(nullptr);
   EXPECT_FALSE(tracker.track(*shown.frame).ok);
+}
+
+// As of wheels: they measure the way ahead. The prior is 4 mm off, less than the gate of any match.
+TEST_F(TrackerTest, APriorPullsThePoseByItsInformation) {
+  start();
+  track_and_accept(1);
+  const SE3 off = drive(2).boxplus((Vector6d() << 0.004, 0, 0, 0, 0, 0).finished());
+  FixedMotion model;
+  model.prior.T_world_body = off;
+  tracker.use_motion_model(&model);
+  const TrackOutcome by_images = track(2);
+  ASSERT_TRUE(by_images.ok);
+  EXPECT_LT(error_of(by_images.T_world_body, drive(2)), 2e-4);
+  // As certain as the images: half way.
+  model.prior.information = by_images.covariance.inverse();
+  const TrackOutcome half_way = tracker.track(*shown.frame);
+  ASSERT_TRUE(half_way.ok);
+  EXPECT_NEAR(by_images.T_world_body.boxminus_to(half_way.T_world_body)[0], 0.002, 2e-4);
+  EXPECT_LT(half_way.covariance(0, 0), 0.6 * by_images.covariance(0, 0));
+  // Far more certain along x, and only there.
+  model.prior.information.setZero();
+  model.prior.information(0, 0) = 1e4 / by_images.covariance(0, 0);
+  const TrackOutcome pulled = tracker.track(*shown.frame);
+  ASSERT_TRUE(pulled.ok);
+  EXPECT_NEAR(drive(2).boxminus_to(pulled.T_world_body)[0], 0.004, 1e-4);
+  EXPECT_LT(drive(2).boxminus_to(pulled.T_world_body).tail<3>().norm(), 1e-3);
 }
 
 // The turn of each frame is wider than the window around the last pose, not around the prior.
