@@ -167,9 +167,9 @@ void FrontEnd::initialise(const std::shared_ptr<Frame>& frame) {
     initialiser_.remember(frame);
     return;
   }
-  const std::optional<InitialPair> pair = initialiser_.add(frame);
+  const InitialPair* pair = initialiser_.add(frame);
   result_.matches = initialiser_.last_matches();
-  if (!pair) return;
+  if (pair == nullptr) return;
   MappingJob* job = begin_job(MappingJobKind::kStartMap);
   if (job == nullptr) return;
   job->map_id = map_id_ + 1;
@@ -332,6 +332,7 @@ void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
 std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const {
   auto table = intake_.memory_table();
   table.emplace_back("tracker", tracker_.bytes());
+  table.emplace_back("initialiser", initialiser_.bytes());
   table.emplace_back("sensor samples", imu_.bytes() + wheels_.bytes());
   return table;
 }

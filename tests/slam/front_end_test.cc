@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "slam/back_end.h"
+#include "tests/ipc/allocations.h"
 #include "tests/slam/simulated_drive.h"
 
 namespace farpoint::slam {
@@ -200,6 +201,53 @@ TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
   EXPECT_EQ(result->map_id, 2);
   EXPECT_EQ(result->reset_counter, 2U);
   EXPECT_EQ(front_end_.counts().maps, 2U);
+}
+
+class FrontEndHeap : public FrontEndTest {
+ protected:
+  // One frame in lockstep. Counts tracking's heap calls, and not those of mapping or of the drive.
+  FrameResult counted(FeatureInput&& input) {
+    const std::uint64_t before_tracking = test::allocations();
+    front_end_.track(std::move(input), TakeLimit{});
+    heap_calls_ += test::allocations() - before_tracking;
+    work();
+    const std::uint64_t before_replies = test::allocations();
+    const FrameResult& result = front_end_.take_replies_at_once();
+    heap_calls_ += test::allocations() - before_replies;
+    return result;
+  }
+  void track_until(State state) {
+    for (int i = 0; i < 200; ++i)
+      if (counted(drive_.next()).state == state) return;
+    FAIL() << "not " << to_string(state);
+  }
+  void lose_and_find_again() {
+    for (int i = 0; i < 8; ++i) counted(drive_.next_blind());
+    track_until(State::kTracking);
+  }
+  void lose_the_map() {
+    for (int i = 0; i < 60; ++i)
+      if (counted(drive_.next_unknown()).state == State::kInitialising) return;
+    FAIL() << "the map was not given up";
+  }
+
+  std::uint64_t heap_calls_ = 0;
+};
+
+TEST_F(FrontEndHeap, NoCallFromTheFirstFrameOnOverFiveLossesAndTwoNewMaps) {
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
+  track_until(State::kTracking);
+  for (int i = 0; i < 20; ++i) counted(drive_.next());
+  for (int i = 0; i < 3; ++i) lose_and_find_again();
+  for (int i = 0; i < 2; ++i) {
+    lose_the_map();
+    track_until(State::kTracking);
+    for (int k = 0; k < 20; ++k) counted(drive_.next());
+  }
+  EXPECT_EQ(heap_calls_, 0U);
+  EXPECT_GT(test::allocations(), 0U);  // the count works
+  EXPECT_EQ(front_end_.counts().lost, 5U);
+  EXPECT_EQ(front_end_.counts().maps, 3U);
 }
 
 // Mapping is behind: it answers a keyframe of the old map after that was given up.
