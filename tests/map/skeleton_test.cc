@@ -113,7 +113,7 @@ TEST_F(SkeletonTest, BoundedKeepsTheNewest) {
   ASSERT_TRUE(bounded.pose_of(1, keyframes, &T));
   expect_same_pose(T, keyframes[living].T_world_body);
   // Its removal can no longer be noted, and those attached to it are lost with it.
-  bounded.remove(1, 101, SE3{});
+  bounded.remove(1, 101, Sim3{});
   keyframes.release(living);
   EXPECT_FALSE(bounded.pose_of(1, keyframes, &T));
   EXPECT_FALSE(bounded.pose_of(101, keyframes, &T));
