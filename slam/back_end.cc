@@ -74,7 +74,20 @@ bool BackEnd::pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
   if (!o.ok || o.inliers < config_.tracking.min_inliers) return false;
   *prior = o.T_world_body;
   posed->push_back({frame.utime, job.map_id, job.view->reference_id,
-                    job.view->T_world_reference.inverse() * o.T_world_body});
+                    job.view->S_world_reference().inverse() * o.T_world_body});
+  return true;
+}
+
+// Pose of a keyframe, in the unit of a view that may be older than the map's present unit.
+bool BackEnd::pose_in_view(const LocalView& view, std::uint64_t keyframe_id, SE3* T_view_body) const {
+  const Map& map = mapper_.map();
+  Sim3 S_world_reference;
+  if (!map.similarity_of(view.reference_id, &S_world_reference)) return false;
+  SE3 T;
+  if (!map.pose_of(keyframe_id, &T)) return false;
+  if (S_world_reference.scale != view.reference_scale)
+    T = view.S_world_reference() * (S_world_reference.inverse() * T);
+  *T_view_body = T;
   return true;
 }
 
@@ -83,20 +96,20 @@ bool BackEnd::pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
 void BackEnd::pose_frames(const MappingJob& job) {
   const auto first = std::find_if(recorded_.begin(), recorded_.end(),
                                   [&](const KeptFrame& r) { return r.map_id == job.map_id; });
-  SE3 T_world_first;
-  if (first == recorded_.end() || !mapper_.map().pose_of(first->reference_id, &T_world_first)) return;
+  SE3 T_view_first;
+  if (first == recorded_.end() || !pose_in_view(*job.view, first->reference_id, &T_view_first)) return;
   poser_.adopt(job.view, job.seen);
   std::vector<const Frame*> frames;
   for (const auto& f : job.frames) frames.push_back(f.get());
   std::stable_sort(frames.begin(), frames.end(),
                    [](const Frame* a, const Frame* b) { return a->number > b->number; });
   std::vector<RecordedFrame> posed;
-  SE3 prior = T_world_first;
+  SE3 prior = T_view_first;
   for (const Frame* f : frames)
     if (f->number < job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
   // The pair's second frame was recorded next, and stands at the second keyframe.
   if (const auto second = std::next(first); second != recorded_.end())
-    (void)mapper_.map().pose_of(second->reference_id, &prior);
+    (void)pose_in_view(*job.view, second->reference_id, &prior);
   std::for_each(frames.rbegin(), frames.rend(), [&](const Frame* f) {
     if (f->number > job.last_before_map) (void)pose_frame(job, *f, &prior, &posed);
   });

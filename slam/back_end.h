@@ -31,6 +31,8 @@ class BackEnd {
 
   // Takes the poses that tracking has recorded so far. step() does so too.
   void collect_recorded();
+  // Gives a map another origin, other axes or another unit (Mapper::transform_map). Between two steps.
+  void transform_map(std::int32_t map_id, const Sim3& S_new_old) { mapper_.transform_map(map_id, S_new_old); }
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
   // Empty without capacity.whole_trajectory.
@@ -42,6 +44,7 @@ class BackEnd {
   void pose_frames(const MappingJob& job);
   [[nodiscard]] bool pose_frame(const MappingJob& job, const Frame& frame, SE3* prior,
                                 std::vector<RecordedFrame>* posed);
+  [[nodiscard]] bool pose_in_view(const LocalView& view, std::uint64_t keyframe_id, SE3* T_view_body) const;
   void discard_map(std::int32_t map_id);
 
   const EstimatorConfig config_;

@@ -21,15 +21,15 @@ struct CapacityConfig {
   int landmarks = 40000;               // bearing, weak and full together
   int observations_per_landmark = 48;  // beyond it the oldest in between are thinned out
   int window_images = 24;              // keyframes that keep their pyramid for alignment
-  int view_landmarks = 6000;           // that tracking is shown at once
-  // Where every frame and removed keyframe stood is kept for trajectories(): memory grows with the way.
+  int view_landmarks = 6000;           // most in one local view
+  // Keeps the pose of every frame and removed keyframe for trajectories(): memory grows with the way.
   bool whole_trajectory = true;
 };
 
 struct InitialisationConfig {
   double min_parallax_rad = 0.0175;  // a quarter of the points must show it: one degree
   int min_landmarks = 80;            // good points two views must give
-  double max_frames = 60;            // reference is renewed after so many frames
+  double max_frames = 60;            // age at which the reference frame is replaced
 };
 
 struct TrackingConfig {
@@ -44,7 +44,7 @@ struct TrackingConfig {
 
 struct KeyframeConfig {
   double tracked_ratio = 0.85;   // of the reference keyframe's landmarks: fewer, new keyframe
-  int min_interval_frames = 2;   // between two keyframes, or the local window reaches back too short a way
+  int min_interval_frames = 2;   // between two keyframes: the local window must reach back far enough
   int max_interval_frames = 10;  // with motion
   double min_parallax_px = 15;   // median motion since the last keyframe that asks for a new one
 };
@@ -66,25 +66,25 @@ using SolveBundle = void (*)(const BundleOptions*, BundleProblem*, BundleSummary
 struct MappingConfig {
   int neighbours = 20;              // keyframes searched for new landmarks
   int window_keyframes = 20;        // optimised by local BA
-  int window_landmarks = 4000;      // at most so many in one local BA
-  int window_sightings = 24000;     // of these landmarks, at most so many in one local BA
+  int window_landmarks = 4000;      // most in one local BA
+  int window_sightings = 24000;     // of these landmarks, most in one local BA
   int fixed_keyframes = 40;         // historical observers held fixed
   int iterations = 8;               // LM steps, never a time limit
-  int quick_view_delay_frames = 1;  // lockstep: triangulation is visible so many frames after the keyframe
-  int full_view_delay_frames = 2;   // lockstep: local BA is visible so many frames after the keyframe
+  int quick_view_delay_frames = 1;  // lockstep: from a keyframe to the view with its triangulation
+  int full_view_delay_frames = 2;   // lockstep: from a keyframe to the view after its local BA
   std::string solver = "schur";     // schur | ceres
   // Solves instead of the estimator's own solver. Required where `solver` is ceres.
   SolveBundle solve_instead = nullptr;
 };
 
-// Refinement of camera 0's calibration from the map. The sigmas say how far the given calibration is to be
-// trusted.
+// Refinement of camera 0's calibration from the map. The sigmas are those of the given calibration,
+// 1 sigma each.
 struct CalibrationConfig {
   bool refine = true;
   double focal_sigma = 0.003;  // relative
   double centre_sigma_px = 2.0;
   double distortion_sigma = 0.02;   // of the first radial coefficient
-  double information_share = 0.05;  // residuals are not independent: so much of their information counts
+  double information_share = 0.05;  // of the residuals' information that counts: they are not independent
   int min_keyframes = 8;            // free poses a window must have
 };
 

@@ -2,8 +2,8 @@
 // The facade of the estimator: measurements in, poses out. No I/O, no threads, no clock, no logging, no
 // globals.
 //
-// Two halves share nothing but fixed rings: tracking (slam/front_end.h) and mapping (slam/back_end.h). The
-// caller chooses how they run:
+// Two halves share fixed rings only: tracking (slam/front_end.h) and mapping (slam/back_end.h). The caller
+// chooses how they run:
 //   lockstep  process() tracks one frame, runs the mapping jobs it asked for, and takes their results a
 //             configured number of frames later, as a real-time run would;
 //   threads   track() on one thread, map() on another; a frame takes what mapping has ready;
@@ -27,8 +27,8 @@ namespace farpoint::slam {
 
 class Estimator {
  public:
-  // Allocates everything. Throws std::invalid_argument with a sentence a user can act on where the
-  // configuration or the rig cannot work.
+  // Allocates everything. Throws std::invalid_argument where the configuration or the rig cannot work; the
+  // message names the cause and what is expected.
   Estimator(const EstimatorConfig& config, const Rig& rig);
   ~Estimator();
   Estimator(const Estimator&) = delete;
@@ -55,8 +55,8 @@ class Estimator {
   bool map();
 
   // Repeats one frame of a run of threads: mapping works until it has made `taken.replies` replies, and the
-  // frame takes them and as many samples as it took then (FrameResult::taken). Where there are fewer, the run
-  // is another: the result then has smaller numbers.
+  // frame takes them and as many samples as it took then (FrameResult::taken). Smaller numbers in the result
+  // mean that the run is another one.
   const FrameResult& process_recorded(const FrameInput& input, const FrameTaken& taken);
 
   // Called when mapping has made a view, on mapping's thread, before tracking can take it. inspect() is

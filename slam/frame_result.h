@@ -30,7 +30,6 @@ enum class State : std::uint8_t {
 
 enum class ScaleState : std::uint8_t { kUnknown = 0, kAssumed = 1, kMetric = 2 };
 
-// One image of one camera.
 // An image of one camera of the rig.
 struct CameraImage {
   int camera = 0;
@@ -75,7 +74,7 @@ struct FrameResult {
   SE3 T_map_body;
   SE3 T_odom_body;  // continuous: integrates relative motion, never jumps
   Sim3 map_from_odom;
-  Vector6d velocity_body = Vector6d::Zero();  // m/s (map units/s), rad/s in body axes
+  Vector6d velocity_body = Vector6d::Zero();  // m/s (odom units/s), rad/s in body axes
   Matrix6d covariance = Matrix6d::Zero();     // of T_map_body, order (translation, rotation), body axes
   int quality = -1;                           // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;
@@ -88,6 +87,12 @@ struct FrameResult {
   std::uint64_t job = 0;   // number of the last job sent to mapping by this frame; 0: none
   int jobs_under_way = 0;  // jobs waiting for mapping, and the one in work
 
+  // The velocity in map units a second.
+  [[nodiscard]] Vector6d velocity_in_map() const {
+    Vector6d velocity = velocity_body;
+    velocity.head<3>() *= map_from_odom.scale;
+    return velocity;
+  }
   // Tracked against a map that existed before the frame. Tracking's times are measured over such frames.
   [[nodiscard]] bool followed() const { return view_sequence > 0 && state != State::kInitialising; }
 };

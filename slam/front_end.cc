@@ -115,10 +115,10 @@ void FrontEnd::note_counts(const MappingReply& reply) {
 void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
-  tracker_.set_view(std::move(view));
+  const double scale = tracker_.set_view(std::move(view));
   settled_ = tracker_.view()->settled;
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
-  if (!first) odometry_.correct(before, tracker_.T_world_body());
+  if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
 }
 
 // Lockstep: within the frame that found the pair. Threads: before the first frame after mapping is done.
@@ -142,8 +142,8 @@ void FrontEnd::start_map(const MappingReply& reply) {
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });
   for (const auto& f : waiting_) f->drop_pixels();
   record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
-  record(
-      {second.utime, map_id_, view.reference_id, view.T_world_reference.inverse() * view.T_world_reference});
+  record({second.utime, map_id_, view.reference_id,
+          view.S_world_reference().inverse() * view.T_world_reference});
   initialiser_.clear();
   state_ = State::kSettling;
   fill_pose(view.T_world_reference, Matrix6d::Zero());
@@ -167,9 +167,9 @@ void FrontEnd::initialise(const std::shared_ptr<Frame>& frame) {
     initialiser_.remember(frame);
     return;
   }
-  const std::optional<InitialPair> pair = initialiser_.add(frame);
+  const InitialPair* pair = initialiser_.add(frame);
   result_.matches = initialiser_.last_matches();
-  if (!pair) return;
+  if (pair == nullptr) return;
   MappingJob* job = begin_job(MappingJobKind::kStartMap);
   if (job == nullptr) return;
   job->map_id = map_id_ + 1;
@@ -266,7 +266,7 @@ void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOu
   request.frame = frame;
   request.map_id = map_id_;
   request.reference_id = tracker_.view()->reference_id;
-  request.T_reference_body = tracker_.view()->T_world_reference.inverse() * outcome.T_world_body;
+  request.T_reference_body = tracker_.view()->S_world_reference().inverse() * outcome.T_world_body;
   tracker_.sightings(&request.sightings);
   tracker_.take_counts(&request.counts);
   send_job();
@@ -301,11 +301,11 @@ void FrontEnd::release_frames() {
   intake_.release();
 }
 
-// --- what is told of the frame
+// --- the result of a frame
 
 RecordedFrame FrontEnd::relative_to_reference(const Frame& frame, const TrackOutcome& outcome) const {
   return {frame.utime, map_id_, tracker_.view()->reference_id,
-          tracker_.view()->T_world_reference.inverse() * outcome.T_world_body};
+          tracker_.view()->S_world_reference().inverse() * outcome.T_world_body};
 }
 
 void FrontEnd::record(const RecordedFrame& frame) {
@@ -325,12 +325,14 @@ void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
   result_.T_odom_body = odometry_.T_odom_body();
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
   result_.velocity_body = tracker_.velocity_body();
+  result_.velocity_body.head<3>() /= result_.map_from_odom.scale;
   result_.covariance = covariance;
 }
 
 std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const {
   auto table = intake_.memory_table();
   table.emplace_back("tracker", tracker_.bytes());
+  table.emplace_back("initialiser", initialiser_.bytes());
   table.emplace_back("sensor samples", imu_.bytes() + wheels_.bytes());
   return table;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tracking's half of the estimator: frames in, poses out, jobs for mapping. Never waits. Makes no heap call
-// once a map has settled; two-view geometry before the first map may.
+// after construction while frames and views keep to the configured capacities.
 //
 // The order of one frame's work is here. Its parts: FrameIntake makes the frame, MappingPort exchanges jobs
 // and replies, Recovery decides what a lost frame means, Odometry keeps `odom`.

@@ -10,12 +10,12 @@ namespace farpoint::slam {
 std::vector<MapTrajectory> Inspection::trajectories() const {
   std::vector<MapTrajectory> out;
   for (const KeptFrame& r : back_end_.recorded()) {
-    SE3 T_world_reference;
-    if (!back_end_.mapper().map().pose_of(r.reference_id, &T_world_reference)) continue;
+    Sim3 S_world_reference;
+    if (!back_end_.mapper().map().similarity_of(r.reference_id, &S_world_reference)) continue;
     auto it =
         std::find_if(out.begin(), out.end(), [&](const MapTrajectory& t) { return t.map_id == r.map_id; });
     if (it == out.end()) it = out.insert(out.end(), MapTrajectory{r.map_id, {}});
-    it->frames.push_back({r.utime, T_world_reference * r.T_reference_body()});
+    it->frames.push_back({r.utime, S_world_reference * r.T_reference_body()});
   }
   for (MapTrajectory& t : out)
     std::stable_sort(t.frames.begin(), t.frames.end(),

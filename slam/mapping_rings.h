@@ -64,7 +64,8 @@ struct MappingReply {
   std::uint32_t keyframes = 0, landmarks = 0;  // alive
 };
 
-// A frame's pose relative to a keyframe, so that it follows the keyframe through every later optimisation.
+// A frame's pose relative to a keyframe, in the keyframe's own unit (Keyframe::S_world_body): it follows the
+// keyframe through every later optimisation and change of unit.
 struct RecordedFrame {
   std::int64_t utime = 0;
   std::int32_t map_id = 0;

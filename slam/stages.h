@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stages of a frame's way, announced to whoever wants to measure them. The estimator has no clock: a
-// listener outside notes the time.
+// The stages of a frame's way, announced to a listener. The estimator has no clock: the listener notes the
+// time.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ class StageListener {
   virtual void end(Stage stage) = 0;
 };
 
-// A stage for as long as it lives. A null listener is nobody.
+// A stage for the lifetime of the object. The listener may be null.
 class StageSpan {
  public:
   StageSpan(StageListener* listener, Stage stage) : listener_(listener), stage_(stage) {
@@ -49,7 +49,7 @@ class StageSpan {
   Stage stage_;
 };
 
-// Takes a stretch out of a stage that is running around it: what one thread does in lockstep for another.
+// Suspends a running stage for the lifetime of the object: lockstep does another thread's work in it.
 class StagePause {
  public:
   StagePause(StageListener* listener, Stage stage) : listener_(listener), stage_(stage) {

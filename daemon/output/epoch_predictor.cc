@@ -20,8 +20,9 @@ void set_pose(const FrameOutput& frame, ipc::OdometryEpoch* epoch) {
   epoch->heading_rad = angles.heading_rad;
   epoch->roll_rad = angles.roll_rad;
   epoch->pitch_rad = angles.pitch_rad;
-  epoch->velocity_m_s = {r.velocity_body[0], r.velocity_body[1], r.velocity_body[2]};
-  epoch->yaw_rate_rad_s = r.velocity_body[5];
+  const slam::Vector6d velocity = epoch->map_frame ? r.velocity_in_map() : r.velocity_body;
+  epoch->velocity_m_s = {velocity[0], velocity[1], velocity[2]};
+  epoch->yaw_rate_rad_s = velocity[5];
 }
 
 ipc::CanScaleSource scale_source(slam::ScaleState scale) {

@@ -21,7 +21,7 @@ FrameOutput extrapolate(const FrameOutput& frame, double dt_s) {
   if (!frame.valid) return out;
   slam::FrameResult& r = out.result;
   r.T_odom_body = moved(r.T_odom_body, r.velocity_body, dt_s);
-  r.T_map_body = moved(r.T_map_body, r.velocity_body, dt_s);
+  r.T_map_body = moved(r.T_map_body, r.velocity_in_map(), dt_s);
   return out;
 }
 

@@ -166,7 +166,7 @@ bot_core::pose_t make_bot_core_pose(const FrameOutput& frame) {
   bot_core::pose_t m{};
   m.utime = r.utime;
   set_pose(r.T_map_body, m.pos, m.orientation);
-  set_vector(r.T_map_body.q * r.velocity_body.head<3>(), m.vel);
+  set_vector(r.T_map_body.q * r.velocity_in_map().head<3>(), m.vel);
   set_vector(r.velocity_body.tail<3>(), m.rotation_rate);
   return m;
 }

@@ -12,7 +12,7 @@ namespace {
 
 using Distortion = std::array<double, 5>;
 
-// A pinhole stretches without bound towards 90 degrees; at 89.4 degrees (radius 100) it is cut off.
+// A pinhole image stretches without bound towards 90 degrees; it is cut off at 89.4 degrees (radius 100).
 constexpr double kMaxPinholeRadius = 100.0;
 // Straight behind a fisheye every direction in the image plane is as good as any other; stop just before.
 constexpr double kMaxFisheyeTheta_rad = std::numbers::pi - 1e-3;
@@ -126,7 +126,7 @@ bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vecto
                                 [&](double x) { return radial_slope(d, x * x); }, rd, max_radius);
   *m = rd > 0.0 ? Eigen::Vector2d(distorted * (r / rd)) : Eigen::Vector2d(0.0, 0.0);
   if (d[2] == 0.0 && d[3] == 0.0) {
-    // Nothing but radial: solved, unless rd lies beyond what the disc's edge maps to.
+    // Purely radial: solved, unless rd lies beyond the image of the disc's edge.
     const double left = r * radial_factor(d, r * r) - rd;
     return std::abs(left) <= 1e-12 * (1.0 + rd);
   }
@@ -144,8 +144,8 @@ bool radtan_undistort(const Distortion& d, double max_radius, const Eigen::Vecto
   return false;
 }
 
-// --- a point's pixel, and its derivative where `j` is given; inlined, so that what is not asked for costs
-// nothing ---
+// --- a point's pixel, and its derivative where `j` is given; inlined, so that an unused derivative is free
+// ---
 
 inline bool project_pinhole(const Camera::Parameters& p, double max_radius, const Eigen::Vector3d& point_c,
                             Eigen::Vector2d* pixel, Matrix23d* j) {

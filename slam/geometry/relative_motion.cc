@@ -182,15 +182,30 @@ double epipolar_residual2_rad2(const SE3& T_2_1, const Eigen::Vector3d& bearing_
   return e.s2 > 0.0 ? e.c * e.c / e.s2 : kInfinity;
 }
 
+void MotionWorkspace::reserve(size_t matches) {
+  by_parallax.resize(matches);
+  fitting_before.resize(matches + 1);
+  supported.resize(matches);
+  use.resize(matches);
+}
+
+size_t MotionWorkspace::bytes() const {
+  return by_parallax.capacity() * sizeof(Entry) + fitting_before.capacity() * sizeof(size_t) +
+         supported.capacity() + use.capacity() * sizeof(size_t);
+}
+
 std::vector<uint8_t> supported_matches(Bearings bearings_1, Bearings bearings_2, const SE3& T_2_1,
                                        double limit_rad) {
+  MotionWorkspace workspace;
+  return supported_matches(bearings_1, bearings_2, T_2_1, limit_rad, &workspace);
+}
+
+const std::vector<uint8_t>& supported_matches(Bearings bearings_1, Bearings bearings_2, const SE3& T_2_1,
+                                              double limit_rad, MotionWorkspace* workspace) {
+  using Entry = MotionWorkspace::Entry;
   const size_t n = bearings_1.size();
-  struct Entry {
-    double parallax;
-    size_t match;
-    bool fits;
-  };
-  std::vector<Entry> entries(n);
+  std::vector<Entry>& entries = workspace->by_parallax;
+  entries.resize(n);
   for (size_t i = 0; i < n; ++i) {
     const double r2 = epipolar_residual2_rad2(T_2_1, bearings_1[i], bearings_2[i]);
     // The chord grows with the angle, which is all that sorting needs.
@@ -199,9 +214,11 @@ std::vector<uint8_t> supported_matches(Bearings bearings_1, Bearings bearings_2,
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
     return a.parallax != b.parallax ? a.parallax < b.parallax : a.match < b.match;
   });
-  std::vector<size_t> fitting_before(n + 1, 0);
+  std::vector<size_t>& fitting_before = workspace->fitting_before;
+  fitting_before.assign(n + 1, 0);
   for (size_t i = 0; i < n; ++i) fitting_before[i + 1] = fitting_before[i] + (entries[i].fits ? 1U : 0U);
-  std::vector<uint8_t> mask(n, 0);
+  std::vector<uint8_t>& mask = workspace->supported;
+  mask.assign(n, 0);
   for (size_t i = 0; i < n; ++i) {
     if (!entries[i].fits) continue;
     const size_t first = i > kSupportNeighbours ? i - kSupportNeighbours : 0;
@@ -228,12 +245,18 @@ std::array<SE3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
 }
 
 MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad, const SE3& T_2_1) {
+  MotionWorkspace workspace;
+  return refine_motion(bearings_1, bearings_2, sigma_rad, T_2_1, &workspace);
+}
+
+MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad, const SE3& T_2_1,
+                        MotionWorkspace* workspace) {
   MotionFit fit{T_2_1, kInfinity, 0};
   fit.T_2_1.t.normalize();
-  std::vector<size_t> use;
+  std::vector<size_t>& use = workspace->use;
   for (const double limit_sigma : kMotionLimits_sigma) {
-    const std::vector<uint8_t> mask =
-        supported_matches(bearings_1, bearings_2, fit.T_2_1, limit_sigma * sigma_rad);
+    const std::vector<uint8_t>& mask =
+        supported_matches(bearings_1, bearings_2, fit.T_2_1, limit_sigma * sigma_rad, workspace);
     use.clear();
     for (size_t i = 0; i < mask.size(); ++i) {
       if (mask[i] != 0) use.push_back(i);

@@ -38,6 +38,26 @@ using Mask = std::span<const uint8_t>;
 [[nodiscard]] std::vector<uint8_t> supported_matches(Bearings bearings_1, Bearings bearings_2,
                                                      const SE3& T_2_1, double limit_rad);
 
+// Memory of the two functions below, kept from call to call: no call allocates that has at most as many
+// matches as reserve() was given.
+struct MotionWorkspace {
+  struct Entry {
+    double parallax;
+    size_t match;
+    bool fits;
+  };
+  void reserve(size_t matches);
+  [[nodiscard]] size_t bytes() const;
+
+  std::vector<Entry> by_parallax;
+  std::vector<size_t> fitting_before;
+  std::vector<uint8_t> supported;  // the result of supported_matches
+  std::vector<size_t> use;
+};
+// The same, in the workspace's memory; the result is the workspace's until the next call.
+const std::vector<uint8_t>& supported_matches(Bearings bearings_1, Bearings bearings_2, const SE3& T_2_1,
+                                              double limit_rad, MotionWorkspace* workspace);
+
 struct MotionFit {
   SE3 T_2_1;  // unit translation
   double translation_sigma_rad =
@@ -50,6 +70,8 @@ struct MotionFit {
 // five rounds, within 8 sigma at first and 3 at last.
 [[nodiscard]] MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad,
                                       const SE3& T_2_1);
+[[nodiscard]] MotionFit refine_motion(Bearings bearings_1, Bearings bearings_2, double sigma_rad,
+                                      const SE3& T_2_1, MotionWorkspace* workspace);
 
 // --- plane ---
 

@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "slam/geometry/five_point.h"
+#include "slam/geometry/match_columns.h"
 #include "slam/geometry/random.h"
 #include "slam/geometry/relative_motion.h"
 #include "slam/geometry/robust.h"
+#include "slam/geometry/short_list.h"
 #include "slam/geometry/triangulation.h"
 
 namespace farpoint::slam {
@@ -33,88 +35,6 @@ constexpr double kBehindSigmas = 3.0;
 // The homography must beat the essential motion's GRIC by this factor.
 constexpr double kHomographyAdvantage = 0.98;
 
-// Matches as single-precision columns, padded with zeros to whole blocks; a zero match costs nothing in any
-// model.
-class MatchColumns {
- public:
-  MatchColumns(Bearings bearings_1, Bearings bearings_2) {
-    const Eigen::Index n = static_cast<Eigen::Index>(bearings_1.size());
-    const Eigen::Index padded = (n + kBlock - 1) / kBlock * kBlock;
-    columns_.setZero(padded, 6);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      columns_.row(i).head<3>() = bearings_1[static_cast<size_t>(i)].cast<float>().transpose();
-      columns_.row(i).tail<3>() = bearings_2[static_cast<size_t>(i)].cast<float>().transpose();
-    }
-  }
-
-  // Sum of min(residual2, limit2) over all matches; stops early, at a value of at least `enough`, once it is
-  // reached. Kernel: (x1, y1, z1, x2, y2, z2 blocks) -> block of squared residuals in rad^2.
-  template <typename Kernel>
-  [[nodiscard]] float cost(const Kernel& kernel, float limit2, float enough) const {
-    float sum = 0.0F;
-    for (Eigen::Index i = 0; i < columns_.rows() && sum < enough; i += kBlock) {
-      sum += residuals2(kernel, i).min(limit2).sum();
-    }
-    return sum;
-  }
-  // Number of matches with residual2 < limit2, padding included.
-  template <typename Kernel>
-  [[nodiscard]] Eigen::Index count(const Kernel& kernel, float limit2) const {
-    Eigen::Index total = 0;
-    for (Eigen::Index i = 0; i < columns_.rows(); i += kBlock)
-      total += (residuals2(kernel, i) < limit2).count();
-    return total;
-  }
-  [[nodiscard]] Eigen::Index padded() const { return columns_.rows(); }
-
-  static constexpr Eigen::Index kBlock = 32;
-  using Block = Eigen::Array<float, kBlock, 1>;
-
- private:
-  template <typename Kernel>
-  [[nodiscard]] Block residuals2(const Kernel& kernel, Eigen::Index i) const {
-    const auto column = [&](Eigen::Index k) -> Block { return columns_.col(k).template segment<kBlock>(i); };
-    return kernel(column(0), column(1), column(2), column(3), column(4), column(5));
-  }
-
-  Eigen::ArrayXXf columns_;
-};
-
-using Block = MatchColumns::Block;
-constexpr float kTiny = 1e-20F;
-
-// Squared Sampson angle of an essential matrix of any scale.
-struct EssentialKernel {
-  Eigen::Matrix3f e;
-  Block operator()(const Block& x1, const Block& y1, const Block& z1, const Block& x2, const Block& y2,
-                   const Block& z2) const {
-    const Block nx = e(0, 0) * x1 + e(0, 1) * y1 + e(0, 2) * z1;
-    const Block ny = e(1, 0) * x1 + e(1, 1) * y1 + e(1, 2) * z1;
-    const Block nz = e(2, 0) * x1 + e(2, 1) * y1 + e(2, 2) * z1;
-    const Block mx = e(0, 0) * x2 + e(1, 0) * y2 + e(2, 0) * z2;
-    const Block my = e(0, 1) * x2 + e(1, 1) * y2 + e(2, 1) * z2;
-    const Block mz = e(0, 2) * x2 + e(1, 2) * y2 + e(2, 2) * z2;
-    const Block c = nx * x2 + ny * y2 + nz * z2;
-    const Block c2 = c * c;
-    const Block s2 = nx * nx + ny * ny + nz * nz + mx * mx + my * my + mz * mz - 2.0F * c2;
-    return c2 / s2.max(kTiny);
-  }
-};
-
-// Half the squared sine between H b1 and b2: the noise of both views counted as if H kept angles. Opposite
-// directions pass here and fail in the exact residual.
-struct TransferKernel {
-  Eigen::Matrix3f h;
-  Block operator()(const Block& x1, const Block& y1, const Block& z1, const Block& x2, const Block& y2,
-                   const Block& z2) const {
-    const Block px = h(0, 0) * x1 + h(0, 1) * y1 + h(0, 2) * z1;
-    const Block py = h(1, 0) * x1 + h(1, 1) * y1 + h(1, 2) * z1;
-    const Block pz = h(2, 0) * x1 + h(2, 1) * y1 + h(2, 2) * z1;
-    const Block cx = py * z2 - pz * y2, cy = pz * x2 - px * z2, cz = px * y2 - py * x2;
-    return 0.5F * (cx * cx + cy * cy + cz * cz) / (px * px + py * py + pz * pz).max(kTiny);
-  }
-};
-
 // Samples that reach a clean one with the wanted probability at this inlier share.
 int needed_samples(double inlier_share, int sample_size, int max_samples) {
   const double clean = std::pow(std::clamp(inlier_share, 0.0, 1.0), sample_size);
@@ -128,6 +48,7 @@ struct Problem {
   double sigma_rad;
   const TwoViewOptions& options;
   MatchColumns columns;
+  TwoViewWorkspace& work;
 
   [[nodiscard]] size_t size() const { return b1.size(); }
   [[nodiscard]] float limit2(double chi2) const { return static_cast<float>(chi2 * sigma_rad * sigma_rad); }
@@ -161,12 +82,12 @@ struct RotationFit {
   size_t inliers = 0;
 };
 
-std::vector<uint8_t> rotation_inliers(const Problem& p, const Eigen::Matrix3d& r, double chi2) {
-  std::vector<uint8_t> mask(p.size());
+void find_rotation_inliers(const Problem& p, const Eigen::Matrix3d& r, double chi2,
+                           std::vector<uint8_t>* mask) {
+  mask->resize(p.size());
   for (size_t i = 0; i < p.size(); ++i) {
-    mask[i] = rotation_residual2_rad2(r, p.b1[i], p.b2[i]) < chi2 * p.sigma_rad * p.sigma_rad ? 1 : 0;
+    (*mask)[i] = rotation_residual2_rad2(r, p.b1[i], p.b2[i]) < chi2 * p.sigma_rad * p.sigma_rad ? 1 : 0;
   }
-  return mask;
 }
 
 size_t count_set(const std::vector<uint8_t>& mask) {
@@ -192,10 +113,11 @@ RotationFit find_rotation(const Problem& p) {
     best.R_2_1 = r;
     samples = needed_samples(p.share(kernel, kChi2TwoDof99), kSample, p.options.max_samples);
   }
-  std::vector<uint8_t> mask = rotation_inliers(p, best.R_2_1, kChi2TwoDof99);
+  std::vector<uint8_t>& mask = p.work.mask;
+  find_rotation_inliers(p, best.R_2_1, kChi2TwoDof99, &mask);
   for (int round = 0; round < 3 && count_set(mask) >= kSample; ++round) {
     best.R_2_1 = fit_rotation(p.b1, p.b2, mask);
-    mask = rotation_inliers(p, best.R_2_1, kChi2TwoDof99);
+    find_rotation_inliers(p, best.R_2_1, kChi2TwoDof99, &mask);
   }
   best.inliers = count_set(mask);
   return best;
@@ -206,7 +128,7 @@ RotationFit find_rotation(const Problem& p) {
 struct HomographyFit {
   bool found = false;
   Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
-  std::vector<double> chi2;
+  std::span<const double> chi2;  // of each match
   size_t inliers = 0;
 };
 
@@ -234,32 +156,37 @@ HomographyFit find_homography(const Problem& p) {
   }
   if (!best.found) return best;
   best.h = refine_homography(p.b1, p.b2, p.sigma_rad, best.h);
-  best.chi2.resize(p.size());
+  std::vector<double>& chi2 = p.work.plane_chi2;
+  chi2.resize(p.size());
   for (size_t i = 0; i < p.size(); ++i) {
-    best.chi2[i] = homography_residual2_rad2(best.h, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
-    best.inliers += best.chi2[i] < kChi2TwoDof99 ? 1U : 0U;
+    chi2[i] = homography_residual2_rad2(best.h, p.b1[i], p.b2[i]) / (p.sigma_rad * p.sigma_rad);
+    best.inliers += chi2[i] < kChi2TwoDof99 ? 1U : 0U;
   }
+  best.chi2 = chi2;
   return best;
 }
 
 // --- essential motion ---
 
 struct EssentialHypothesis {
-  float cost;
-  Eigen::Matrix3d e;
+  float cost = 0.0F;
+  Eigen::Matrix3d e = Eigen::Matrix3d::Identity();
 };
+
+// One more than are kept: the next one is inserted before the last one goes.
+using Hypotheses = ShortList<EssentialHypothesis, kMaxHypotheses + 1>;
 
 double essential_distance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return std::min((a - b).norm(), (a + b).norm());
 }
 
 // Keeps the best few hypotheses that differ from each other, best first.
-void keep(const EssentialHypothesis& candidate, std::vector<EssentialHypothesis>* kept) {
+void keep(const EssentialHypothesis& candidate, Hypotheses* kept) {
   for (const EssentialHypothesis& other : *kept) {
     if (other.cost <= candidate.cost && essential_distance(other.e, candidate.e) < kDifferentEssential)
       return;
   }
-  std::erase_if(*kept, [&](const EssentialHypothesis& other) {
+  kept->erase_if([&](const EssentialHypothesis& other) {
     return essential_distance(other.e, candidate.e) < kDifferentEssential;
   });
   const auto place = std::find_if(kept->begin(), kept->end(), [&](const EssentialHypothesis& other) {
@@ -269,10 +196,10 @@ void keep(const EssentialHypothesis& candidate, std::vector<EssentialHypothesis>
   if (kept->size() > kMaxHypotheses) kept->pop_back();
 }
 
-std::vector<EssentialHypothesis> find_essentials(const Problem& p) {
+Hypotheses find_essentials(const Problem& p) {
   constexpr size_t kSample = 5;
   SampleGenerator generator(p.options.seed + 2);
-  std::vector<EssentialHypothesis> kept;
+  Hypotheses kept;
   float best_cost = std::numeric_limits<float>::max();
   int samples = p.options.max_samples;
   for (int k = 0; k < samples; ++k) {
@@ -296,17 +223,7 @@ std::vector<EssentialHypothesis> find_essentials(const Problem& p) {
 
 // --- comparing motions ---
 
-enum class Side : uint8_t { kFront, kBehind, kNoDepth };
-
-// One match under one motion.
-struct MatchGeometry {
-  double chi2 = 0.0;  // epipolar residual
-  Side side = Side::kNoDepth;
-  bool supported = true;  // see supported_matches
-  double inverse_depth = 0.0;
-  double inverse_depth_sigma = 0.0;
-  double parallax_rad = 0.0;
-};
+using Side = MatchGeometry::Side;
 
 MatchGeometry match_geometry(const SE3& T_2_1, const Eigen::Vector3d& b1, const Eigen::Vector3d& b2,
                              double sigma_rad) {
@@ -338,6 +255,8 @@ struct Candidate {
   double translation_sigma_rad = 0.0;
   double cost = 0.0;
 };
+constexpr size_t kPlaneMotions = 4;
+using Candidates = ShortList<Candidate, kMaxHypotheses + kPlaneMotions>;
 
 // Truncated chi-square of a match's epipolar residual; a point behind a view costs as much as an outlier.
 double match_cost(const Problem& p, const SE3& T_2_1, size_t i) {
@@ -377,8 +296,8 @@ bool different(const SE3& a, const SE3& b) {
 }
 
 // Motions of either model with their costs.
-std::vector<Candidate> plane_motions(const Problem& p, const HomographyFit& plane) {
-  std::vector<Candidate> motions;
+Candidates plane_motions(const Problem& p, const HomographyFit& plane) {
+  Candidates motions;
   if (!plane.found) return motions;
   const PlaneMotions all = decompose_homography(plane.h);
   for (size_t i = 0; i < all.count; ++i) {
@@ -387,9 +306,8 @@ std::vector<Candidate> plane_motions(const Problem& p, const HomographyFit& plan
   return motions;
 }
 
-std::vector<Candidate> essential_motions(const Problem& p,
-                                         const std::vector<EssentialHypothesis>& essentials) {
-  std::vector<Candidate> motions;
+Candidates essential_motions(const Problem& p, const Hypotheses& essentials) {
+  Candidates motions;
   for (const EssentialHypothesis& hypothesis : essentials) {
     const SE3 motion = motion_in_front(p, hypothesis.e);
     motions.push_back({motion, 0.0, motion_cost(p, motion)});
@@ -397,22 +315,27 @@ std::vector<Candidate> essential_motions(const Problem& p,
   return motions;
 }
 
-void sort_by_cost(std::vector<Candidate>* motions) {
-  std::stable_sort(motions->begin(), motions->end(),
-                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+// Stable, by insertion: std::stable_sort calls the heap.
+void sort_by_cost(Candidates* motions) {
+  for (Candidate* next = motions->begin(); next != motions->end(); ++next) {
+    Candidate* const place =
+        std::upper_bound(motions->begin(), next, *next,
+                         [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+    std::rotate(place, next, next + 1);
+  }
 }
 
 // The best few that differ from each other, each moved to its own optimum of the epipolar cost, best first.
-std::vector<Candidate> refined_candidates(const Problem& p, std::vector<Candidate> motions) {
+Candidates refined_candidates(const Problem& p, Candidates motions) {
   sort_by_cost(&motions);
-  std::vector<Candidate> candidates;
+  Candidates candidates;
   for (const Candidate& motion : motions) {
     const bool known = std::any_of(candidates.begin(), candidates.end(),
                                    [&](const Candidate& c) { return !different(c.T_2_1, motion.T_2_1); });
     if (!known && candidates.size() < kMaxHypotheses) candidates.push_back(motion);
   }
   for (Candidate& candidate : candidates) {
-    const MotionFit fit = refine_motion(p.b1, p.b2, p.sigma_rad, candidate.T_2_1);
+    const MotionFit fit = refine_motion(p.b1, p.b2, p.sigma_rad, candidate.T_2_1, &p.work.motion);
     candidate = {fit.T_2_1, fit.translation_sigma_rad, motion_cost(p, fit.T_2_1)};
   }
   sort_by_cost(&candidates);
@@ -437,8 +360,9 @@ bool plane_is_better(const HomographyFit& plane, const std::vector<MatchGeometry
 }
 
 // Variance of the residuals in units of sigma^2 as the matches show it, at least 1.
-double observed_variance(const std::vector<MatchGeometry>& geometry) {
-  std::vector<double> chi2;
+double observed_variance(const std::vector<MatchGeometry>& geometry, std::vector<double>* memory) {
+  std::vector<double>& chi2 = *memory;
+  chi2.clear();
   for (const MatchGeometry& m : geometry) {
     if (is_inlier(m)) chi2.push_back(m.chi2);
   }
@@ -448,10 +372,11 @@ double observed_variance(const std::vector<MatchGeometry>& geometry) {
   return std::max(1.0, *middle / kChi2OneDof50);
 }
 
-std::vector<MatchGeometry> all_geometry(const Problem& p, const SE3& T_2_1) {
-  std::vector<MatchGeometry> geometry(p.size());
-  const std::vector<uint8_t> supported =
-      supported_matches(p.b1, p.b2, T_2_1, std::sqrt(kChi2OneDof99) * p.sigma_rad);
+const std::vector<MatchGeometry>& all_geometry(const Problem& p, const SE3& T_2_1) {
+  std::vector<MatchGeometry>& geometry = p.work.geometry;
+  geometry.resize(p.size());
+  const std::vector<uint8_t>& supported =
+      supported_matches(p.b1, p.b2, T_2_1, std::sqrt(kChi2OneDof99) * p.sigma_rad, &p.work.motion);
   for (size_t i = 0; i < p.size(); ++i) {
     geometry[i] = match_geometry(T_2_1, p.b1[i], p.b2[i], p.sigma_rad);
     geometry[i].supported = supported[i] != 0;
@@ -459,8 +384,10 @@ std::vector<MatchGeometry> all_geometry(const Problem& p, const SE3& T_2_1) {
   return geometry;
 }
 
-void fill_matches(const std::vector<MatchGeometry>& geometry, TwoViewResult* result) {
-  std::vector<double> parallaxes;
+void fill_matches(const std::vector<MatchGeometry>& geometry, std::vector<double>* memory,
+                  TwoViewResult* result) {
+  std::vector<double>& parallaxes = *memory;
+  parallaxes.clear();
   result->inliers = 0;
   result->valid_depths = 0;
   for (size_t i = 0; i < geometry.size(); ++i) {
@@ -483,7 +410,7 @@ void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewRes
   result->status = TwoViewStatus::kNoParallax;
   result->model = TwoViewModel::kNone;
   result->T_2_1 = {Eigen::Quaterniond(rotation.R_2_1).normalized(), Eigen::Vector3d::Zero()};
-  result->inlier = rotation_inliers(p, rotation.R_2_1, kChi2TwoDof99);
+  find_rotation_inliers(p, rotation.R_2_1, kChi2TwoDof99, &result->inlier);
   result->inliers = rotation.inliers;
   result->valid_depths = 0;
   result->median_parallax_rad = 0.0;
@@ -496,7 +423,8 @@ void set_rotation_only(const Problem& p, const RotationFit& rotation, TwoViewRes
 // Share of the matches that the motion explains and the rotation does not, at the noise as it turned out.
 double unexplained_share(const Problem& p, const RotationFit& rotation,
                          const std::vector<MatchGeometry>& geometry) {
-  const double limit = kChi2TwoDof99 * observed_variance(geometry) * p.sigma_rad * p.sigma_rad;
+  const double variance = observed_variance(geometry, &p.work.values);
+  const double limit = kChi2TwoDof99 * variance * p.sigma_rad * p.sigma_rad;
   size_t explained = 0, unexplained = 0;
   for (size_t i = 0; i < p.size(); ++i) {
     if (!is_inlier(geometry[i])) continue;
@@ -512,7 +440,7 @@ bool enough_inliers(const Problem& p, size_t inliers) {
 }
 
 // The plane's own motion that agrees with the best one, or null.
-const Candidate* agreeing(const std::vector<Candidate>& on_plane, const SE3& best) {
+const Candidate* agreeing(const Candidates& on_plane, const SE3& best) {
   const Candidate* chosen = nullptr;
   for (const Candidate& c : on_plane) {
     if (!different(c.T_2_1, best) && (chosen == nullptr || c.cost < chosen->cost)) chosen = &c;
@@ -524,7 +452,7 @@ const Candidate* agreeing(const std::vector<Candidate>& on_plane, const SE3& bes
 // place of the variance, which vanishes where every match pays the same. Motions that share a plane's
 // homography see different components of each match's noise, so that their costs differ by chance by the root
 // of the sum of squares.
-double rival_sigmas(const Problem& p, const std::vector<Candidate>& candidates) {
+double rival_sigmas(const Problem& p, const Candidates& candidates) {
   const SE3& best = candidates.front().T_2_1;
   double least = std::numeric_limits<double>::infinity();
   for (const Candidate& c : candidates) {
@@ -538,6 +466,19 @@ double rival_sigmas(const Problem& p, const std::vector<Candidate>& candidates) 
     least = std::min(least, sum2 > 0.0 ? sum / std::sqrt(sum2) : 0.0);
   }
   return least;
+}
+
+// All values of an empty result, in the memory of an older one.
+void begin_result(size_t matches, TwoViewResult* result) {
+  TwoViewResult empty;
+  empty.inlier = std::move(result->inlier);
+  empty.inverse_depth = std::move(result->inverse_depth);
+  empty.parallax_rad = std::move(result->parallax_rad);
+  *result = std::move(empty);
+  result->matches = matches;
+  result->inlier.assign(matches, 0);
+  result->inverse_depth.assign(matches, 0.0);
+  result->parallax_rad.assign(matches, 0.0);
 }
 
 }  // namespace
@@ -558,19 +499,45 @@ const char* name(TwoViewStatus status) {
   return "unknown";
 }
 
+void TwoViewWorkspace::reserve(size_t matches) {
+  columns.setZero(MatchColumns::padded_rows(matches), MatchColumns::kColumns);
+  // Touched, not only reserved.
+  mask.resize(matches);
+  plane_chi2.resize(matches);
+  values.resize(matches);
+  geometry.resize(matches);
+  motion.reserve(matches);
+  result.inlier.resize(matches);
+  result.inverse_depth.resize(matches);
+  result.parallax_rad.resize(matches);
+}
+
+size_t TwoViewWorkspace::bytes() const {
+  return static_cast<size_t>(columns.size()) * sizeof(float) + mask.capacity() +
+         (plane_chi2.capacity() + values.capacity()) * sizeof(double) +
+         geometry.capacity() * sizeof(MatchGeometry) + motion.bytes() + result.inlier.capacity() +
+         (result.inverse_depth.capacity() + result.parallax_rad.capacity()) * sizeof(double);
+}
+
 TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
                                 std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
                                 const TwoViewOptions& options) {
-  TwoViewResult result;
-  const size_t n = std::min(bearings_1.size(), bearings_2.size());
-  result.matches = n;
-  result.inlier.assign(n, 0);
-  result.inverse_depth.assign(n, 0.0);
-  result.parallax_rad.assign(n, 0.0);
+  TwoViewWorkspace workspace;
+  return estimate_two_view(bearings_1, bearings_2, sigma_rad, options, &workspace);
+}
+
+const TwoViewResult& estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
+                                       std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
+                                       const TwoViewOptions& options, TwoViewWorkspace* workspace) {
+  TwoViewResult& result = workspace->result;
+  begin_result(std::min(bearings_1.size(), bearings_2.size()), &result);
+  const size_t n = result.matches;
   if (n < std::max<size_t>(options.min_matches, 6) || !(sigma_rad > 0.0)) return result;
   bearings_1 = bearings_1.first(n);
   bearings_2 = bearings_2.first(n);
-  const Problem p{bearings_1, bearings_2, sigma_rad, options, MatchColumns(bearings_1, bearings_2)};
+  const Problem p{
+      bearings_1, bearings_2, sigma_rad, options, MatchColumns(bearings_1, bearings_2, &workspace->columns),
+      *workspace};
 
   const RotationFit rotation = find_rotation(p);
   result.rotation_inliers = rotation.inliers;
@@ -581,18 +548,18 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
     return result;
   }
 
-  const std::vector<EssentialHypothesis> essentials = find_essentials(p);
+  const Hypotheses essentials = find_essentials(p);
   const HomographyFit plane = find_homography(p);
   result.homography_inliers = plane.inliers;
-  const std::vector<Candidate> on_plane = plane_motions(p, plane);
-  std::vector<Candidate> motions = essential_motions(p, essentials);
-  motions.insert(motions.end(), on_plane.begin(), on_plane.end());
-  const std::vector<Candidate> candidates = refined_candidates(p, std::move(motions));
+  const Candidates on_plane = plane_motions(p, plane);
+  Candidates motions = essential_motions(p, essentials);
+  for (const Candidate& motion : on_plane) motions.push_back(motion);
+  const Candidates candidates = refined_candidates(p, motions);
   result.status = TwoViewStatus::kPoorModel;
   if (candidates.empty()) return result;
 
   const Candidate& best = candidates.front();
-  std::vector<MatchGeometry> geometry = all_geometry(p, best.T_2_1);
+  const std::vector<MatchGeometry>& geometry = all_geometry(p, best.T_2_1);
   result.essential_inliers = static_cast<size_t>(std::count_if(geometry.begin(), geometry.end(), is_inlier));
   result.unexplained_share = unexplained_share(p, rotation, geometry);
   if (result.unexplained_share <= options.max_unexplained_share && enough_inliers(p, rotation.inliers)) {
@@ -608,11 +575,11 @@ TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
     if (const Candidate* motion = agreeing(on_plane, best.T_2_1)) {
       result.model = TwoViewModel::kHomography;
       result.T_2_1 = motion->T_2_1;
-      geometry = all_geometry(p, result.T_2_1);
+      (void)all_geometry(p, result.T_2_1);  // the same memory
     }
   }
-  fill_matches(geometry, &result);
-  const double variance = observed_variance(geometry);
+  fill_matches(geometry, &workspace->values, &result);
+  const double variance = observed_variance(geometry, &workspace->values);
   result.rival_sigmas = rival_sigmas(p, candidates);
   if (!enough_inliers(p, result.inliers)) {
     result.status = TwoViewStatus::kPoorModel;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "slam/geometry/relative_motion.h"
 #include "slam/geometry/se3.h"
 
 namespace farpoint::slam {
@@ -74,5 +75,35 @@ struct TwoViewResult {
 [[nodiscard]] TwoViewResult estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
                                               std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
                                               const TwoViewOptions& options = {});
+
+// What a match is under one motion.
+struct MatchGeometry {
+  enum class Side : uint8_t { kFront, kBehind, kNoDepth };
+
+  double chi2 = 0.0;  // epipolar residual
+  Side side = Side::kNoDepth;
+  bool supported = true;  // see supported_matches
+  double inverse_depth = 0.0;
+  double inverse_depth_sigma = 0.0;
+  double parallax_rad = 0.0;
+};
+
+// Memory of estimate_two_view(), kept from call to call: no call allocates that has at most as many matches
+// as reserve() was given.
+struct TwoViewWorkspace {
+  void reserve(size_t matches);
+  [[nodiscard]] size_t bytes() const;
+
+  Eigen::ArrayXXf columns;    // of the matches, in single precision
+  std::vector<uint8_t> mask;  // of the matches that a rotation explains
+  std::vector<double> plane_chi2, values;
+  std::vector<MatchGeometry> geometry;
+  MotionWorkspace motion;
+  TwoViewResult result;
+};
+// The same, in the workspace's memory; the result is the workspace's until the next call.
+const TwoViewResult& estimate_two_view(std::span<const Eigen::Vector3d> bearings_1,
+                                       std::span<const Eigen::Vector3d> bearings_2, double sigma_rad,
+                                       const TwoViewOptions& options, TwoViewWorkspace* workspace);
 
 }  // namespace farpoint::slam

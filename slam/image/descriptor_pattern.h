@@ -14,7 +14,7 @@ namespace farpoint::slam {
 inline constexpr int kDescriptorPairs = 256;
 extern const std::int8_t kDescriptorPattern[kDescriptorPairs][4];
 
-// Angles are rounded to one of so many.
+// Angles that the pattern is turned to.
 inline constexpr int kAngleBins = 128;
 // The bin nearest to angle_rad, -pi..pi.
 [[nodiscard]] int angle_bin(float angle_rad);

@@ -11,7 +11,7 @@
 
 namespace farpoint::slam {
 
-// A grey 8-bit image somebody else owns. Rows are `stride_bytes` apart.
+// A grey 8-bit image, owned by the caller. Rows are `stride_bytes` apart.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width_px = 0, height_px = 0;
@@ -41,8 +41,8 @@ struct Feature {
 };
 
 // The surroundings of a corner on its pyramid level: kSize x kSize pixels, row-major, the corner at index
-// (kCentre, kCentre). To the estimator it is an opaque payload: only the FrameImage that made it (or one of
-// the same kind) reads it.
+// (kCentre, kCentre). The estimator passes it on unread: only a FrameImage of the kind that made it reads
+// it.
 struct Patch {
   static constexpr int kSize = 16;
   static constexpr int kCentre = 8;
@@ -65,7 +65,7 @@ struct FeatureSet {
   std::vector<Descriptor> descriptors;
 };
 
-// The pixels behind a frame, as far as the estimator needs them. Two kinds exist: a pyramid of a real image
+// The pixels of a frame, for patches and alignment. Two kinds exist: a pyramid of a real image
 // (PyramidImage), and the feature-level simulator of the tests, which computes what alignment would have
 // measured.
 class FrameImage {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The inner loops of image processing, as a table of functions: a plain C++ version, which is the definition
 // and the reference of the tests, and Highway versions for every instruction set, chosen at run time. All
-// arithmetic is integer, or float in one fixed
-// order of operations, and every version gives the same bits.
+// arithmetic is integer, or float in one fixed order of operations. Every version gives the same
+// bits.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +22,9 @@ struct ResampleBlock {
   std::int32_t first = 0;  // first source byte of the window
 };
 
-// Kernels that fill rows work in whole vectors of at most so many elements: every row handed to one has room
-// for its width rounded up to a multiple of this, and resample_row may read as many bytes behind the last
-// source pixel.
+// Most elements of one vector. A row that a kernel fills has room for its width rounded up to a multiple of
+// this. resample_row may read as many bytes behind the last source
+// pixel.
 inline constexpr int kRowAlignment = 64;
 
 // A descriptor and an orientation read a square of this side around the corner, corner at (kRadius, kRadius).
@@ -50,7 +50,7 @@ struct PointArrays {
   const float* level = nullptr;
 };
 
-// The surroundings of a line segment, and what else a point of it must be like.
+// The surroundings of a line segment, and the limits of level and angle for a point in it.
 struct Band {
   float u_px = 0, v_px = 0;               // where the segment begins
   float along_u = 1, along_v = 0;         // its direction, unit
@@ -101,8 +101,8 @@ struct Kernels {
 
   // Blur with (1 2 3 4 3 2 1) / 16 (variance 2.5 px^2), made of rounded averages of two: avg(a, b) = (a + b +
   // 1) / 2, fine(x) = avg(avg(p[x-1], p[x+1]), p[x]), out(x) = avg(avg(fine(x-2), fine(x+2)), fine(x)).
-  // blur_row needs three pixels on both sides of source[0..width) rounded up to kRowAlignment (what they hold
-  // at the edges is the caller's business); blur_column does the same over seven rows.
+  // blur_row needs three pixels on both sides of source[0..width) rounded up to kRowAlignment; the caller
+  // chooses their values at the edges. blur_column does the same over seven rows.
   void (*blur_row)(const std::uint8_t* source, int width, std::uint8_t* out);
   void (*blur_column)(const std::uint8_t* const rows[7], int width, std::uint8_t* out);
 

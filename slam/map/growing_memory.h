@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for lists that grow through a whole run (std::pmr::deque): in slabs of their own. Block by block
-// from the heap they would lie between what comes and goes there, and keep its holes from ever closing.
+// Memory for lists that grow through a whole run (std::pmr::deque): in slabs of their own. Single blocks
+// from the heap would fragment it.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ class GrowingMemory {
   [[nodiscard]] std::pmr::memory_resource* resource() { return &slabs_; }
 
  private:
-  // A deque's blocks have 512 bytes; so many of them at once, in the end: 256 kB.
+  // A deque's block, and the blocks of the largest slab (256 kB).
   static constexpr std::size_t kBlock_bytes = 512, kBlocksAtOnce = 512;
   std::pmr::unsynchronized_pool_resource slabs_{{kBlocksAtOnce, kBlock_bytes}};
 };

@@ -37,12 +37,16 @@ struct Keyframe {
   std::int32_t map_id = 0;
   std::uint32_t optimised = 0;  // times local BA moved it
   SE3 T_world_body;
+  double scale = 1.0;  // present map units in one of its own: those of the map when it was made
   PerCamera<KeyframeView> views;
 
   // Most wide ones first: keyframes that share only distant landmarks say little about each other's place.
   // Then most shared, then newest.
   std::vector<Covisible> covisible;
 
+  // Maps body coordinates in the keyframe's own unit to the world. A pose relative to the keyframe, in that
+  // unit, follows it through every change of the map's unit.
+  [[nodiscard]] Sim3 S_world_body() const { return {scale, T_world_body.q, T_world_body.t}; }
   // Some camera's pixels are still there.
   [[nodiscard]] bool has_pixels() const {
     for (int c = 0; c < views.size(); ++c)

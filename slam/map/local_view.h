@@ -26,9 +26,12 @@ struct ViewLandmark {
   double nearness = 0;        // in_reference: 1 / distance from the reference's camera, 1 / map units
 };
 
+// Two views of one map hold the correction of a keyframe between them, a similarity:
+// S_world_body of the newer one * inverse of that of the older one.
 struct ViewKeyframe {
   std::uint64_t id = 0;
   SE3 T_world_body;
+  double scale = 1.0;  // Keyframe::scale
 };
 
 struct LocalView {
@@ -37,6 +40,7 @@ struct LocalView {
   Rig rig;                         // with the calibration as refined so far
   std::uint64_t reference_id = 0;  // newest keyframe
   SE3 T_world_reference;
+  double reference_scale = 1.0;         // Keyframe::scale of the reference
   std::vector<ViewKeyframe> keyframes;  // the window, for re-expressing older poses
   std::vector<ViewLandmark> landmarks;
   int reference_landmarks = 0;    // full landmarks in the reference keyframe
@@ -44,6 +48,11 @@ struct LocalView {
   int map_keyframes = 0;          // alive in this map
   double median_depth = 1.0;      // of the reference keyframe's landmarks, map units
   bool settled = false;           // the map's scale holds (mapping/settling)
+
+  // Keyframe::S_world_body of the reference.
+  [[nodiscard]] Sim3 S_world_reference() const {
+    return {reference_scale, T_world_reference.q, T_world_reference.t};
+  }
 };
 
 }  // namespace farpoint::slam

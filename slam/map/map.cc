@@ -150,7 +150,7 @@ void Map::remove_from_skeleton(KeyframeHandle handle) {
   if (parent == nullptr)
     skeleton_.remove_without_parent(keyframe.id);
   else
-    skeleton_.remove(keyframe.id, parent->id, parent->T_world_body.inverse() * keyframe.T_world_body);
+    skeleton_.remove(keyframe.id, parent->id, parent->S_world_body().inverse() * keyframe.S_world_body());
 }
 
 void Map::thin_keyframe(KeyframeHandle handle) {
@@ -373,6 +373,28 @@ double Map::parallax(const Landmark& l, const Observation& o) const {
   const Eigen::Vector3d a = T_world_anchor(l).q * l.bearing;
   const Eigen::Vector3d b = T_world_camera(k, o.camera).q * bearing;
   return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+void Map::correct_keyframe(KeyframeHandle handle, const Sim3& S_new_old) {
+  Keyframe& keyframe = keyframes_[handle];
+  keyframe.T_world_body = S_new_old * keyframe.T_world_body;
+  keyframe.scale *= S_new_old.scale;
+  for (int c = 0; c < keyframe.views.size(); ++c)
+    for (const LandmarkHandle& h : keyframe.views[c].landmarks) {
+      Landmark* l = landmarks_.get(h);
+      // Once a landmark, also where two cameras of its host see it.
+      if (l == nullptr || l->host != handle || find_observation(*l, handle)->camera != c) continue;
+      l->T_host_anchor.t *= S_new_old.scale;
+      l->inverse_depth /= S_new_old.scale;
+      l->inverse_depth_sigma /= S_new_old.scale;
+      l->creation_depth *= S_new_old.scale;
+    }
+}
+
+void Map::transform(std::int32_t map_id, const Sim3& S_new_old) {
+  keyframes_.for_each([&](KeyframeHandle h, const Keyframe& k) {
+    if (k.map_id == map_id) correct_keyframe(h, S_new_old);
+  });
 }
 
 void Map::discard_map(std::int32_t map_id) {

@@ -93,6 +93,12 @@ class Map {
   void set_camera(int index, const Camera& camera);
   // Removes everything of one map.
   void discard_map(std::int32_t map_id);
+  // Moves a keyframe by a similarity of world coordinates, with the landmarks that it hosts: pose, anchors,
+  // depths. Removed keyframes follow those that they are attached to. The rig's lever arms stay: a change of
+  // scale is exact where they are zero, as with one camera and an unknown scale.
+  void correct_keyframe(KeyframeHandle handle, const Sim3& S_new_old);
+  // The same of a whole map: another origin, other axes, another unit.
+  void transform(std::int32_t map_id, const Sim3& S_new_old);
 
   // --- parts
 
@@ -102,6 +108,10 @@ class Map {
   // recent ones only. False where the pose is unknown.
   [[nodiscard]] bool pose_of(std::uint64_t keyframe_id, SE3* T_world_body) const {
     return skeleton_.pose_of(keyframe_id, keyframes_, T_world_body);
+  }
+  // The same with the keyframe's unit: for poses relative to it (Keyframe::S_world_body).
+  [[nodiscard]] bool similarity_of(std::uint64_t keyframe_id, Sim3* S_world_body) const {
+    return skeleton_.similarity_of(keyframe_id, keyframes_, S_world_body);
   }
   [[nodiscard]] const Chain& chain() const { return chain_; }
   // Where measurements between the keyframe before and this one go. Null for the first of its map.

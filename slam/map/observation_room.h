@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for the landmarks' observations: taken and touched at the start, lent out in pieces of a few sizes,
-// and used again. More is taken from the heap only when all of it is lent.
+// Memory for the landmarks' observations: allocated and touched at the start, lent in pieces of a few sizes,
+// and reused. More comes from the heap once all of it is lent.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace farpoint::slam {
 
-// One block, given away from its beginning to its end, once; what it has no room for comes from the heap.
+// One block, lent from its beginning to its end, once. Requests beyond its end go to the heap.
 class BlockThenHeap final : public std::pmr::memory_resource {
  public:
   explicit BlockThenHeap(std::size_t bytes) : block_(bytes) {}  // zeroed, hence touched
@@ -32,7 +32,7 @@ class BlockThenHeap final : public std::pmr::memory_resource {
 
 class ObservationRoom {
  public:
-  // For so many observations in all, in lists of so many at most.
+  // `observations`: of all lists together. `longest_list`: most of one list.
   ObservationRoom(std::size_t observations, std::size_t longest_list)
       : whole_(observations * sizeof(Observation)),
         pieces_({kPiecesAtOnce, longest_list * sizeof(Observation)}, &whole_) {}
@@ -42,7 +42,7 @@ class ObservationRoom {
   [[nodiscard]] std::size_t heap_bytes() const { return whole_.heap_bytes(); }
 
  private:
-  // Pieces of one size come so many at once: few enough that what is taken for a size is soon used.
+  // Pieces of one size that are allocated together: few, so that none stays unused for long.
   static constexpr std::size_t kPiecesAtOnce = 64;
 
   BlockThenHeap whole_;

@@ -28,13 +28,13 @@ struct SightingCount {
   std::uint16_t visible = 0, found = 0;
 };
 
-// A request to make a frame a keyframe. Its pose is relative to a keyframe, which mapping may move in
-// the meantime.
+// A request to make a frame a keyframe. Its pose is relative to a keyframe, which mapping may move and scale
+// in the meantime.
 struct KeyframeRequest {
   std::shared_ptr<Frame> frame;
   std::int32_t map_id = 0;
   std::uint64_t reference_id = 0;
-  SE3 T_reference_body;
+  SE3 T_reference_body;  // in the reference's own unit (Keyframe::S_world_body)
   std::vector<Sighting> sightings;
   std::vector<SightingCount> counts;
 };

@@ -12,13 +12,14 @@ void Skeleton::add(std::uint64_t id, KeyframeHandle keyframe) {
   ++first_id_;
 }
 
-void Skeleton::remove(std::uint64_t id, std::uint64_t parent_id, const SE3& T_parent_this) {
+void Skeleton::remove(std::uint64_t id, std::uint64_t parent_id, const Sim3& S_parent_this) {
   Node* node = find(id);
   if (node == nullptr) return;
   node->alive = {};
   node->parent_id = parent_id;
-  node->q_parent_this = T_parent_this.q;
-  node->t_parent_this = T_parent_this.t;
+  node->q_parent_this = S_parent_this.q;
+  node->t_parent_this = S_parent_this.t;
+  node->scale_parent_this = S_parent_this.scale;
 }
 
 void Skeleton::remove_without_parent(std::uint64_t id) {
@@ -26,21 +27,28 @@ void Skeleton::remove_without_parent(std::uint64_t id) {
 }
 
 bool Skeleton::pose_of(std::uint64_t id, const Pool<Keyframe>& keyframes, SE3* T_world_body) const {
-  SE3 tail;
+  Sim3 S;
+  if (!similarity_of(id, keyframes, &S)) return false;
+  *T_world_body = {S.q, S.t};
+  return true;
+}
+
+bool Skeleton::similarity_of(std::uint64_t id, const Pool<Keyframe>& keyframes, Sim3* S_world_body) const {
+  Sim3 tail;
   while (const Node* node = find(id)) {
     if (const Keyframe* k = keyframes.get(node->alive)) {
-      *T_world_body = k->T_world_body * tail;
+      *S_world_body = k->S_world_body() * tail;
       return true;
     }
     if (node->parent_id == 0) return false;
-    tail = SE3{Eigen::Quaterniond(node->q_parent_this), node->t_parent_this} * tail;
+    tail = Sim3{node->scale_parent_this, Eigen::Quaterniond(node->q_parent_this), node->t_parent_this} * tail;
     id = node->parent_id;
   }
   // A living keyframe may be older than the oldest node.
   bool found = false;
   keyframes.for_each([&](KeyframeHandle, const Keyframe& k) {
     if (k.id != id) return;
-    *T_world_body = k.T_world_body * tail;
+    *S_world_body = k.S_world_body() * tail;
     found = true;
   });
   return found;

@@ -12,8 +12,8 @@
 
 namespace farpoint::slam {
 
-// A removed keyframe is rigidly attached to a parent and follows it through every later optimisation. The
-// parent may be removed in turn.
+// A removed keyframe is attached to a parent and follows it through every later optimisation and change of
+// unit. The parent may be removed in turn.
 class Skeleton {
  public:
   // Keeps the newest `nodes` keyframes; 0 keeps all, and memory grows with the run.
@@ -22,22 +22,26 @@ class Skeleton {
   // Preconditions: ids start at 1 and ascend by 1.
   void add(std::uint64_t id, KeyframeHandle keyframe);
   // Call before the keyframe's slot is released. Does nothing where the node was dropped.
-  void remove(std::uint64_t id, std::uint64_t parent_id, const SE3& T_parent_this);
+  void remove(std::uint64_t id, std::uint64_t parent_id, const Sim3& S_parent_this);
   // The same of a keyframe without a parent: its pose is lost, and the poses of all attached to it.
   void remove_without_parent(std::uint64_t id);
 
-  // Pose of keyframe `id`, alive or removed. False where the chain of parents ends at a lost or dropped
-  // node.
+  // Keyframe::S_world_body of keyframe `id`, alive or removed. False where the chain of parents ends at a
+  // lost or dropped node.
+  [[nodiscard]] bool similarity_of(std::uint64_t id, const Pool<Keyframe>& keyframes,
+                                   Sim3* S_world_body) const;
+  // Its rigid part.
   [[nodiscard]] bool pose_of(std::uint64_t id, const Pool<Keyframe>& keyframes, SE3* T_world_body) const;
   [[nodiscard]] std::size_t size() const { return nodes_.size(); }
 
  private:
-  // A long run has hundreds of thousands of nodes: SE3's alignment would add 16 bytes of padding to each.
+  // A long run has hundreds of thousands of nodes: Sim3's alignment would add 8 bytes of padding to each.
   struct Node {
     KeyframeHandle alive;         // null once removed
     std::uint64_t parent_id = 0;  // 0: none
     Eigen::Quaternion<double, Eigen::DontAlign> q_parent_this;
     Eigen::Vector3d t_parent_this;
+    double scale_parent_this = 1.0;
   };
   // Null where the node was dropped or never added.
   [[nodiscard]] const Node* find(std::uint64_t id) const {

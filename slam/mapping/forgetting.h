@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the map forgets: keyframes that say nothing new, and the oldest where memory ends.
+// What the map forgets: redundant keyframes, and the oldest ones where memory ends.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace farpoint::slam {
 void cull_redundant_keyframes(const std::vector<KeyframeHandle>& candidates, std::uint64_t newest_id,
                               Map* map, MappingCounts* counts);
 
-// Thins all but the newest `images` keyframes (Map::thin_keyframe); removes the oldest keyframes (never
-// `newest`) where a pool is full, and landmarks that only they saw.
+// Thins every keyframe except the newest `images` ones (Map::thin_keyframe). Removes the oldest keyframes
+// (never `newest`) where a pool is full, and landmarks that only they saw.
 void limit_memory(int images, KeyframeHandle newest, std::uint64_t newest_id, Map* map,
                   MappingCounts* counts);
 

@@ -13,39 +13,37 @@ namespace farpoint::slam {
 
 namespace {
 
-// Depth of the nearest points searched for, as a share of the depth that nine tenths of what the keyframe
-// sees lie beyond: nearer ones leave the image before they are of use. (Of a median, a map of distant
-// landmarks would put the limit so far out that the near ones, which hold the translation, were no longer
-// found.)
+// Depth of the nearest points searched, as a share of the depth that nine tenths of the keyframe's landmarks
+// lie beyond. Nearer points leave the image before they are of use. A share of the median would exclude the
+// near landmarks, which hold the translation, from a map of distant ones.
 constexpr double kNearQuantile = 0.9;  // of inverse depth
 constexpr double kNearShare = 0.3;
-// Between two keyframes whose baseline is a smaller share of that depth there is no parallax to be found.
+// Least baseline of two keyframes, as a share of that depth: a shorter one shows no parallax.
 constexpr double kMinBaselineShare = 0.002;
-// A feature pair whose depth says it should look so much larger or smaller than it does is a mismatch.
+// Largest factor between a pair's change of size and the change that its depth predicts.
 constexpr double kScaleTolerance = 1.8;
-// Orientation of a corner repeats to about 10 degrees; three times that, with the frame's roll taken as
+// The orientation of a corner repeats to about 10 degrees: three times that. The frame's roll counts as
 // small.
 constexpr float kMaxAngleDifference_rad = 0.6F;
-// Poses of neighbouring keyframes are known to about this much in the image.
+// Error of neighbouring keyframes' poses in the image, 1 sigma.
 constexpr double kPoseSigma_px = 0.5;
 constexpr std::uint64_t kBearingLife_keyframes = 12;
 constexpr int kMaxFailures = 3;
-// Poses and corners put a feature this far from its epipolar line, pixels of its pyramid level.
+// Largest distance of a feature from its epipolar line, pixels of its pyramid level.
 constexpr float kBand_level_px = 3.0F;
-// The same corner is found up to so many pyramid levels away from where its size says.
+// Most pyramid levels between a corner and the level that its size predicts.
 constexpr int kLevelReach = 3;
-// Other keyframes, those that share most first, asked whether they show what two make a point of, and the
-// share of them that must: the patch is not found everywhere, but seen from another side, behind a car, in
-// motion blur. (All neighbours asked, five sixths of the right points that two keyframes made of simulated
-// roads and streets passed this share, and 6 to 12 % of the wrong ones; of more keyframes than so many the
-// answers of those that see less are worth less.)
+// Other keyframes that are searched for a point of two keyframes, most shared landmarks first. One in
+// kFoundOneIn must show it: a patch may be hidden, blurred, or seen from another side. With all neighbours
+// asked, five sixths of the right points of simulated roads and streets passed this share, and 6 to 12 % of
+// the wrong ones.
 constexpr int kWitnesses = 8;
 constexpr int kFoundOneIn = 3;
-// Sizes here against the host's between which the patch can be expected to be found.
+// Range of the size in the witness against the host's within which the patch can be found.
 constexpr float kMinWitnessScale = 0.55F, kMaxWitnessScale = 1.8F;
 constexpr float kWitnessSearch_level_px = 2.0F;
 constexpr double kWitnessBorder_px = 12.0;  // from the image's edge: half a patch is in it
-// A match must beat the second best on the line by so much: along it every depth is as likely.
+// Largest ratio of a match's distance to the second best on the line: every depth on it is as likely.
 constexpr float kSecondBest = 0.85F;
 
 }  // namespace
@@ -315,10 +313,9 @@ LandmarkMaker::DepthFit LandmarkMaker::fit_depth(const Landmark& l) const {
 bool LandmarkMaker::enough_information(const Landmark& l, const DepthFit& fit) const {
   const bool wide = map_.is_wide(l);
   if (wide || config_.landmarks.mode == LandmarkMode::kBaseline) return wide;
-  // Short of the angle a virtual point is as good a point once three keyframes or more agree on its depth as
-  // well as two under the angle would: a mismatch along the epipolar line does not survive the third. (A
-  // laxer bound, 0.15, made KITTI 03 half worse by a tenth to a fifth: what is promoted when its noise makes
-  // it look near, looks near.)
+  // Short of the angle, three keyframes must agree on the depth as well as two under the angle would. A
+  // mismatch along the epipolar line does not survive the third. A laxer bound (0.15) made KITTI 03 half
+  // worse by a tenth to a fifth: points are then promoted when noise makes them look near.
   return l.observations.size() >= 3 &&
          fit.sigma < config_.landmarks.promote_relative_sigma * fit.inverse_depth;
 }
@@ -327,7 +324,7 @@ bool LandmarkMaker::found_elsewhere(const Landmark& l) const {
   const PredictionInput input = prediction_input(map_, l);
   int asked = 0, found = 0, left = static_cast<int>(witnesses_.size());
   for (const KeyframeHandle witness : witnesses_) {
-    // No more are asked when those that are left cannot change the answer, whatever they say.
+    // Ends once the keyframes that are left cannot change the answer.
     const int more = std::min(left--, kWitnesses - asked);
     const bool certain = kFoundOneIn * found >= asked + more;
     if (more == 0 || certain || kFoundOneIn * (found + more) < asked + more) break;
@@ -362,7 +359,7 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   Landmark& l = map_.landmarks()[handle];
   const DepthFit fit = fit_depth(l);
   if (!fit.ok) {
-    // The worst observation goes; after a few failures all of it.
+    // Removes the worst observation, and the landmark after a few failures.
     ++l.failures;
     if (l.failures >= kMaxFailures || l.observations.size() <= 2) {
       map_.remove_landmark(handle);
@@ -375,7 +372,7 @@ void LandmarkMaker::try_promote(LandmarkHandle handle, bool through_vmp) {
   l.inverse_depth = fit.inverse_depth;
   l.inverse_depth_sigma = fit.sigma;
   if (!enough_information(l, fit)) return;
-  // A third sighting has passed the test of the fit; of two, any mismatch along the epipolar line does.
+  // Two sightings fit any mismatch along the epipolar line; three have passed the test of the fit.
   if (l.observations.size() == 2 && !found_elsewhere(l)) return;
 
   // Size in the images against size by depth.

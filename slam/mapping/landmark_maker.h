@@ -22,9 +22,9 @@ class LandmarkMaker {
   // Pairs each camera of the new keyframe with the same camera of its neighbours: makes landmarks, adds
   // observations and promotes.
   void process(KeyframeHandle newer, const std::vector<KeyframeHandle>& neighbours);
-  // A VMP that tracking has seen once more: promotes it where that was what it lacked.
+  // Call after tracking has seen a VMP once more: promotes it where it suffices now.
   void reconsider(LandmarkHandle handle);
-  // Gives back the slots of VMPs not seen for a while, and of the least useful ones beyond the limit.
+  // Removes VMPs that were not seen for a while, and the least useful ones beyond the limit.
   void evict_bearings(KeyframeHandle newest);
 
   // Inverse depth from every observation, given the poses. False where it is behind a camera or an
@@ -37,7 +37,7 @@ class LandmarkMaker {
   [[nodiscard]] DepthFit fit_depth(const Landmark& landmark) const;
 
  private:
-  // Two features that show the same point, as far as descriptors, the epipolar line and alignment can tell.
+  // Two features that show the same point, by descriptors, epipolar line and alignment.
   struct Pair {
     std::size_t feature_new = 0, feature_old = 0;
     int distance = 0;
@@ -63,12 +63,11 @@ class LandmarkMaker {
   void merge(LandmarkHandle into, LandmarkHandle from);
   void try_promote(LandmarkHandle handle, bool through_vmp);
   [[nodiscard]] bool enough_information(const Landmark& landmark, const DepthFit& fit) const;
-  // Whether the other keyframes bear out a point that only two have seen. The corners of a pair on a guard
-  // rail, a lane marking, in a row of posts or on an asphalt that looks the same everywhere may be two
-  // different things: where the way to the true match is barred (it has left the image, or looks too
-  // different), a wrong one that moves along with the vehicle wins undisputed, as a distant point of small
-  // sigma. But where such a point would have to be in a third image, it is not. True also where no other
-  // keyframe should show it.
+  // Whether other keyframes confirm a point that only two have seen. On repeated texture (guard rails, lane
+  // markings, rows of posts, asphalt) the two corners may be different things. Where the true match has left
+  // the image or looks too different, a wrong one that moves with the vehicle wins. It becomes a distant
+  // point of small sigma. A third image does not show such a point where its depth puts it. True also where
+  // no other keyframe should show the point.
   [[nodiscard]] bool found_elsewhere(const Landmark& landmark) const;
   // Whether the patch is found in the first view of the keyframe that should show it; null where none should.
   [[nodiscard]] std::optional<bool> shows(const Keyframe& witness, const Landmark& landmark,

@@ -109,13 +109,13 @@ void Mapper::note_creation_sigmas(std::int32_t map_id) {
 // A keyframe
 
 std::shared_ptr<const LocalView> Mapper::insert(const KeyframeRequest& request) {
-  SE3 T_world_reference;
-  if (!map_.pose_of(request.reference_id, &T_world_reference)) return nullptr;
+  Sim3 S_world_reference;
+  if (!map_.similarity_of(request.reference_id, &S_world_reference)) return nullptr;
   if (map_.keyframes().full())
     limit_memory(config_.capacity.window_images, keyframe_maker_.newest(), keyframe_maker_.newest_id(), &map_,
                  &counts_);
   const KeyframeHandle keyframe =
-      keyframe_maker_.make(*request.frame, T_world_reference * request.T_reference_body, request.map_id);
+      keyframe_maker_.make(*request.frame, S_world_reference * request.T_reference_body, request.map_id);
   if (keyframe.is_null()) return nullptr;
   attach_sightings(keyframe, request);
   probation_.judge(keyframe_maker_.newest_id());

@@ -50,6 +50,8 @@ class Mapper {
   void discard_map(std::int32_t map_id) { map_.discard_map(map_id); }
   // Keeps a map that no keyframe is added to any more; its keyframes free their pixels.
   void retire_map(std::int32_t map_id);
+  // Gives a map another origin, other axes or another unit. Every later view holds the correction.
+  void transform_map(std::int32_t map_id, const Sim3& S_new_old) { map_.transform(map_id, S_new_old); }
 
   [[nodiscard]] const Map& map() const { return map_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }

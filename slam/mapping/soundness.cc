@@ -9,7 +9,7 @@ namespace farpoint::slam {
 
 namespace {
 
-// An affine field has six parameters; fewer measurements than this hardly tell it from chance.
+// Fewest measurements of an affine field, which has six parameters: fewer hardly separate it from chance.
 constexpr double kLeastMeasurements = 30.0;
 
 // Least squares of a keyframe's residuals by 1, x, y, where the image reaches from -1 to 1 in x.
@@ -28,10 +28,10 @@ struct Field {
     right += w * place * residual.transpose();
     squares += w * residual.squaredNorm();
   }
-  // As many of one weight would tell as much.
+  // Number of equal weights with the same information.
   [[nodiscard]] double measurements() const { return weight2 > 0.0 ? weight * weight / weight2 : 0.0; }
-  // The weights say how much a residual counts, not how large its error is: so what the field explains of
-  // independent errors of one size is not its number of parameters, but a trace.
+  // The weights are no inverse variances. The part of independent, equal errors that the field explains is
+  // therefore a trace, not its number of parameters.
   [[nodiscard]] double f_statistic() const {
     const auto solver = normal.ldlt();
     const double explained = solver.solve(right).cwiseProduct(right).sum();
@@ -57,7 +57,7 @@ double coherence_of(const BundleProblem& problem) {
       const int index = point.first_measurement + i;
       const auto& m = problem.measurements[static_cast<std::size_t>(index)];
       const auto pose = static_cast<std::size_t>(m.pose);
-      // The host's own sighting says nothing: the landmark lies on its ray.
+      // The host's own sighting has no residual: the landmark lies on its ray.
       if (m.pose == point.host || problem.poses[pose].fixed || m.chi2 > kChi2TwoDof) continue;
       Eigen::Vector2d residual;
       if (residual_world(world, frames.view(m), m, &residual))
@@ -90,8 +90,8 @@ bool Soundness::holds(bool held_before) const {
   // Residuals may be large because pixels are coarse or leaves move: with a global shutter and a right
   // calibration the mean is 0.4 to 1.2. They may also have a pattern that is too small to matter, where the
   // measurements are good: mean times coherence is 0.4 to 1.8 then, and up to 2.8 for a moment. A rolling
-  // shutter under fast rotation shows means of 1 to 3, and 1.5 to 15. Neither alone is enough: the map that
-  // it has bent for long fits well and coherently wrong.
+  // shutter under fast rotation shows means of 1 to 3, and 1.5 to 15. Neither alone is enough: after a while
+  // the bent map fits well, with a pattern.
   constexpr double kChi2 = 1.3, kStillChi2 = 1.5;
   constexpr double kPattern = 2.0, kStillPattern = 3.0;
   return mean_chi2 <= (held_before ? kStillChi2 : kChi2) &&

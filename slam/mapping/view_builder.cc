@@ -51,7 +51,7 @@ std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bo
   anchors_.forget();
   for (const KeyframeHandle& h : keyframes_) {
     const Keyframe& k = map_.keyframes()[h];
-    view->keyframes.push_back({k.id, k.T_world_body});
+    view->keyframes.push_back({k.id, k.T_world_body, k.scale});
     add_landmarks(h, h == reference, view.get());
   }
   std::sort(view->keyframes.begin(), view->keyframes.end(),
@@ -71,6 +71,7 @@ void ViewBuilder::begin(KeyframeHandle reference, bool settled, LocalView* view)
   view->map_id = centre.map_id;
   view->reference_id = centre.id;
   view->T_world_reference = centre.T_world_body;
+  view->reference_scale = centre.scale;
   view->settled = settled;
   view->rig = map_.rig();
   view->map_keyframes = 0;

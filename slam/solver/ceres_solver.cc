@@ -15,12 +15,11 @@ namespace farpoint::slam {
 
 namespace {
 
-// A body pose as Ceres sees it: quaternion x y z w, then translation; moved by SE3::boxplus.
+// A body pose as a parameter block: quaternion x y z w, then translation; moved by SE3::boxplus.
 //
 // The cost functions below give their derivatives by the six numbers of boxplus in the first six of the seven
-// columns; the Jacobian of Plus therefore only picks those. Each derivative is thus computed once and for the
-// tangent, and nothing is lost, since Ceres uses the seven columns for nothing but their product with this
-// matrix.
+// columns; the Jacobian of Plus picks those. Each derivative is computed once, for the tangent. Nothing is
+// lost: Ceres uses the seven columns in their product with this matrix only.
 class BodyPoseManifold final : public ceres::Manifold {
  public:
   static constexpr int kAmbient = 7, kTangent = 6;

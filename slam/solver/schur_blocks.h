@@ -3,8 +3,8 @@
 // normal equations.
 //
 // Pose steps are taken in world axes here, (dt_w, dphi_w) = (R dt, R dphi) with the (dt, dphi) of se3.h: a
-// landmark's derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t,
-// without a rotation for every measurement, and the same for host and target but for the sign.
+// landmark's derivative by a pose is then that of its world point times (rho I, -[y]x), y = xyz - rho t.
+// It needs no rotation a measurement; host and target differ in sign only.
 #pragma once
 
 #include <cstddef>

@@ -45,15 +45,21 @@ void ConstantVelocity::start(const SE3& T_world_body, std::int64_t utime) {
   confirmed_ = newest_;
 }
 
-void ConstantVelocity::correct(const LocalView& before, const LocalView& after) {
-  if (before.map_id != after.map_id) return;
+double ConstantVelocity::correct(const LocalView& before, const LocalView& after) {
+  if (before.map_id != after.map_id) return 1.0;
   const auto common =
       std::find_if(before.keyframes.rbegin(), before.keyframes.rend(),
                    [&](const ViewKeyframe& k) { return find_keyframe(after, k.id) != nullptr; });
-  if (common == before.keyframes.rend()) return;
+  if (common == before.keyframes.rend()) return 1.0;
   const ViewKeyframe &was = *common, &is = *find_keyframe(after, common->id);
-  for (Motion* m : {&newest_, &confirmed_})
-    m->T_world_body = is.T_world_body * (was.T_world_body.inverse() * m->T_world_body);
+  const double scale = is.scale / was.scale;
+  for (Motion* m : {&newest_, &confirmed_}) {
+    SE3 T_keyframe_body = was.T_world_body.inverse() * m->T_world_body;
+    T_keyframe_body.t *= scale;
+    m->T_world_body = is.T_world_body * T_keyframe_body;
+    m->velocity.head<3>() *= scale;
+  }
+  return scale;
 }
 
 void ConstantVelocity::accept(const SE3& T_world_body, std::int64_t utime) {

@@ -34,9 +34,10 @@ class ConstantVelocity final : public MotionModel {
 
   // Forgets everything: a new map begins at this pose, without a velocity.
   void start(const SE3& T_world_body, std::int64_t utime);
-  // Applies the correction of a newer view of the same map. Both poses follow the newest keyframe that both
-  // views contain.
-  void correct(const LocalView& before, const LocalView& after);
+  // Applies the correction of a newer view of the same map, scale included. Poses and velocities follow the
+  // newest keyframe that both views contain. Returns the scale: new map units in an old one; 1 where the
+  // views share no keyframe.
+  double correct(const LocalView& before, const LocalView& after);
   // Takes a pose as newest and confirmed.
   void accept(const SE3& T_world_body, std::int64_t utime);
   // Takes a pose as newest only; its velocity is measured from the confirmed pose.

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "slam/geometry/two_view.h"
 #include "slam/image/descriptor_search.h"
+#include "slam/tracking/work_space.h"
 
 namespace farpoint::slam {
 
@@ -23,7 +23,24 @@ constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
 
 Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig, int camera)
     : config_(config), camera_(camera), rig_camera_(rig.cameras[static_cast<std::size_t>(camera)]) {
+  const auto features = static_cast<std::size_t>(config.extractor.features);
   history_.reserve(kHistoryFrames + 1);
+  reserve_touched(&expected_px_, features);
+  reserve_touched(&pairs_, features);
+  reserve_touched(&pair_.points, features);
+  reserve_touched(&owner_, features);
+  reserve_touched(&found_, features);
+  reserve_touched(&owner_distance_, features);
+  reserve_touched(&first_, features);
+  reserve_touched(&second_, features);
+  reserve_touched(&used_, features);
+  two_view_.reserve(features);
+}
+
+std::size_t Initialiser::bytes() const {
+  return capacity_bytes(expected_px_) + capacity_bytes(pairs_) + capacity_bytes(pair_.points) +
+         capacity_bytes(owner_) + capacity_bytes(found_) + capacity_bytes(owner_distance_) +
+         capacity_bytes(first_) + capacity_bytes(second_) + capacity_bytes(used_) + two_view_.bytes();
 }
 
 void Initialiser::remember(std::shared_ptr<Frame> frame) {
@@ -34,6 +51,8 @@ void Initialiser::remember(std::shared_ptr<Frame> frame) {
 void Initialiser::clear() {
   history_.clear();
   reference_.reset();
+  pair_.first.reset();
+  pair_.second.reset();
   last_matches_ = 0;
 }
 
@@ -52,13 +71,13 @@ void Initialiser::forget_pixels(std::uint64_t age) {
     if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->drop_pixels();
 }
 
-void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
-  out->clear();
+void Initialiser::match(const Frame& frame) {
+  pairs_.clear();
   const float radius_px = kFirstWindow * static_cast<float>(rig_camera_.camera.width_px());
   const FrameView &first = view_of(*reference_), &second = view_of(frame);
-  std::vector<std::int32_t> owner(second.set.features.size(), -1);
-  std::vector<int> owner_distance(second.set.features.size(), 257);
-  std::vector<std::int32_t> found(first.set.features.size(), -1);
+  owner_.assign(second.set.features.size(), -1);
+  owner_distance_.assign(second.set.features.size(), 257);
+  found_.assign(first.set.features.size(), -1);
   for (std::size_t i = 0; i < first.set.features.size(); ++i) {
     const Feature& f = first.set.features[i];
     DescriptorQuery q;
@@ -75,69 +94,75 @@ void Initialiser::match(const Frame& frame, std::vector<Pairing>* out) {
         second.set, second.grid, q, [](std::size_t) { return true; }, &distance);
     if (j < 0) continue;
     const auto ju = static_cast<std::size_t>(j);
-    if (distance >= owner_distance[ju]) continue;
-    if (owner[ju] >= 0) found[static_cast<std::size_t>(owner[ju])] = -1;
-    owner[ju] = static_cast<std::int32_t>(i);
-    owner_distance[ju] = distance;
-    found[i] = j;
+    if (distance >= owner_distance_[ju]) continue;
+    if (owner_[ju] >= 0) found_[static_cast<std::size_t>(owner_[ju])] = -1;
+    owner_[ju] = static_cast<std::int32_t>(i);
+    owner_distance_[ju] = distance;
+    found_[i] = j;
   }
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (found[i] < 0) continue;
-    const auto j = static_cast<std::size_t>(found[i]);
-    out->push_back({i, j});
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    if (found_[i] < 0) continue;
+    const auto j = static_cast<std::size_t>(found_[i]);
+    pairs_.push_back({i, j});
     expected_px_[i] = {second.set.features[j].u_px, second.set.features[j].v_px};
   }
 }
 
-std::optional<InitialPair> Initialiser::solve(const std::shared_ptr<Frame>& frame,
-                                              const std::vector<Pairing>& pairs) const {
-  const RigCamera& camera = rig_camera_;
-  std::vector<Eigen::Vector3d> first, second;
-  std::vector<Pairing> used;
-  for (const Pairing& p : pairs) {
+void Initialiser::unproject_pairs(const Frame& frame) {
+  const Camera& camera = rig_camera_.camera;
+  first_.clear();
+  second_.clear();
+  used_.clear();
+  for (const Pairing& p : pairs_) {
     const Feature& a = view_of(*reference_).set.features[p.feature_first];
-    const Feature& b = view_of(*frame).set.features[p.feature_second];
+    const Feature& b = view_of(frame).set.features[p.feature_second];
     Eigen::Vector3d ba, bb;
-    if (!camera.camera.unproject({a.u_px, a.v_px}, &ba) || !camera.camera.unproject({b.u_px, b.v_px}, &bb))
-      continue;
-    first.push_back(ba);
-    second.push_back(bb);
-    used.push_back(p);
+    if (!camera.unproject({a.u_px, a.v_px}, &ba) || !camera.unproject({b.u_px, b.v_px}, &bb)) continue;
+    first_.push_back(ba);
+    second_.push_back(bb);
+    used_.push_back(p);
   }
-  const TwoViewResult r = estimate_two_view(first, second, kCornerSigma_px / camera.camera.focal_px());
-  if (r.status != TwoViewStatus::kOk) return {};
-  // A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough,
-  // and in a sparse scene half of those that a map must have.
-  const auto wide = std::count_if(r.parallax_rad.begin(), r.parallax_rad.end(), [&](const double& p) {
-    return p > config_.initialisation.min_parallax_rad &&
-           r.inlier[static_cast<std::size_t>(&p - r.parallax_rad.data())] != 0;
-  });
-  if (wide < std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks / 2,
-                                      static_cast<std::ptrdiff_t>(r.inliers / 4)))
-    return {};
-  InitialPair pair;
-  pair.first = reference_;
-  pair.second = frame;
-  pair.camera = camera_;
+}
+
+// A scene may be far for the most part: a quarter of the points near enough to fix the baseline is enough,
+// and in a sparse scene half of those that a map must have.
+bool Initialiser::shows_parallax(const TwoViewResult& motion) const {
+  std::ptrdiff_t wide = 0;
+  for (std::size_t i = 0; i < motion.parallax_rad.size(); ++i)
+    wide += motion.parallax_rad[i] > config_.initialisation.min_parallax_rad && motion.inlier[i] != 0 ? 1 : 0;
+  return wide >= std::max<std::ptrdiff_t>(config_.initialisation.min_landmarks / 2,
+                                          static_cast<std::ptrdiff_t>(motion.inliers / 4));
+}
+
+bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
+  unproject_pairs(*frame);
+  const TwoViewResult& r =
+      estimate_two_view(first_, second_, kCornerSigma_px / rig_camera_.camera.focal_px(), {}, &two_view_);
+  if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) return false;
+  pair_.first = reference_;
+  pair_.second = frame;
+  pair_.camera = camera_;
   // T_2_1 is between cameras; with an unknown scale the lever arm to the body is zero by definition
   // (config.h).
   const SE3 T_c1_c2 = r.T_2_1.inverse();
-  pair.T_first_second = camera.T_body_camera * T_c1_c2 * camera.T_body_camera.inverse();
-  for (std::size_t i = 0; i < used.size(); ++i) {
+  pair_.T_first_second = rig_camera_.T_body_camera * T_c1_c2 * rig_camera_.T_body_camera.inverse();
+  pair_.points.clear();
+  for (std::size_t i = 0; i < used_.size(); ++i) {
     if (r.inlier[i] == 0 || r.inverse_depth[i] <= 0.0) continue;
-    pair.points.push_back({used[i].feature_first, used[i].feature_second, r.inverse_depth[i]});
+    pair_.points.push_back({used_[i].feature_first, used_[i].feature_second, r.inverse_depth[i]});
   }
-  if (static_cast<int>(pair.points.size()) < config_.initialisation.min_landmarks) return {};
-  return pair;
+  return static_cast<int>(pair_.points.size()) >= config_.initialisation.min_landmarks;
 }
 
-std::optional<InitialPair> Initialiser::add(const std::shared_ptr<Frame>& frame) {
+const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
+  pair_.first.reset();
+  pair_.second.reset();
   remember(frame);
   if (!reference_) {
     set_reference(frame);
-    return {};
+    return nullptr;
   }
-  match(*frame, &pairs_);
+  match(*frame);
   last_matches_ = static_cast<int>(pairs_.size());
   const auto age = frame->number - reference_->number;
   most_matches_ = std::max(most_matches_, last_matches_);
@@ -150,13 +175,13 @@ std::optional<InitialPair> Initialiser::add(const std::shared_ptr<Frame>& frame)
     const auto next = std::find_if(history_.begin(), history_.end(),
                                    [&](const auto& f) { return f->number >= half && f->has_pixels(); });
     set_reference(next != history_.end() && age > 1 ? *next : frame);
-    match(*frame, &pairs_);
+    match(*frame);
     last_matches_ = static_cast<int>(pairs_.size());
     most_matches_ = last_matches_;
     if (last_matches_ < wanted) set_reference(frame);
-    return {};
+    return nullptr;
   }
-  return solve(frame, pairs_);
+  return solve(frame) ? &pair_ : nullptr;
 }
 
 }  // namespace farpoint::slam

@@ -27,7 +27,7 @@ std::size_t PoseRefiner::bytes() const {
   return capacity_bytes(measurements_) + capacity_bytes(motions_px_);
 }
 
-PoseSolution PoseRefiner::solve(const SE3& T_world_body_start) {
+PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& prior) {
   const StageSpan span(listener_, Stage::kPose);
   measurements_.clear();
   for (const Match& m : matcher_.matches()) {
@@ -41,12 +41,12 @@ PoseSolution PoseRefiner::solve(const SE3& T_world_body_start) {
     pm.camera = m.camera;
     measurements_.push_back(pm);
   }
-  PoseSolution s = solve_pose(matcher_.view()->rig, T_world_body_start, measurements_);
+  PoseSolution s = solve_pose(matcher_.view()->rig, prior, T_world_body_start, measurements_);
   for (std::size_t i = 0; i < measurements_.size(); ++i) matcher_.set_inlier(i, measurements_[i].inlier);
   return s;
 }
 
-TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_start) {
+TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_start, const PosePrior& prior) {
   TrackOutcome out;
   out.T_world_body = T_world_body_start;
   matcher_.drop_outliers();
@@ -56,7 +56,7 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   matcher_.align(frame);
   out.matches = static_cast<int>(matcher_.matches().size());
   if (out.matches < config_.min_matches / 2) return out;
-  const PoseSolution s = solve(T_world_body_start);
+  const PoseSolution s = solve(T_world_body_start, prior);
   out.T_world_body = s.T_world_body;
   out.covariance = s.covariance;
   out.inliers = s.inliers;

@@ -21,11 +21,12 @@ class PoseRefiner {
   PoseRefiner(const EstimatorConfig& config, Matcher* matcher, int cameras = 1);
   void listen(StageListener* listener) { listener_ = listener; }
 
-  // Solves the pose from the present matches and marks which of them are inliers.
-  PoseSolution solve(const SE3& T_world_body_start);
+  // Solves the pose from the present matches and the prior's information, and marks which matches are
+  // inliers.
+  PoseSolution solve(const SE3& T_world_body_start, const PosePrior& prior = {});
   // Keeps the inliers among the present matches, adds matches with the view's other landmarks around `start`,
-  // aligns all, and solves.
-  TrackOutcome refine(const Frame& frame, const SE3& T_world_body_start);
+  // aligns all, and solves as above.
+  TrackOutcome refine(const Frame& frame, const SE3& T_world_body_start, const PosePrior& prior = {});
 
   // Bytes of the work space.
   [[nodiscard]] std::size_t bytes() const;

@@ -202,12 +202,12 @@ void prior_residual(const SE3& T_prior, const SE3& T_world_body, Vector6d* resid
   d_pose->bottomRightCorner<3, 3>() = so3_right_jacobian_inverse(residual->tail<3>());
 }
 
-PoseSolution solve_pose(const Rig& rig, const PosePrior& prior, std::span<PoseMeasurement> measurements,
-                        int rounds) {
+PoseSolution solve_pose(const Rig& rig, const PosePrior& prior, const SE3& T_world_body_start,
+                        std::span<PoseMeasurement> measurements, int rounds) {
   constexpr int kFewest = 6;
   const Problem problem{rig, prior, (prior.information.array() != 0.0).any()};
   PoseSolution s;
-  s.T_world_body = prior.T_world_body;
+  s.T_world_body = T_world_body_start;
   for (int round = 0; round < rounds; ++round) {
     s.T_world_body = descend(problem, s.T_world_body, measurements);
     const Sorted used = classify(rig, s.T_world_body, kChi2Used, measurements);

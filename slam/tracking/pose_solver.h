@@ -29,19 +29,24 @@ struct PoseSolution {
   bool ok = false;
 };
 
-// Levenberg-Marquardt with Huber weights from the prior's pose, in at most `rounds` rounds. Each round ends
+// Levenberg-Marquardt with Huber weights from a start, in at most `rounds` rounds. Each round ends
 // with a new choice of the measurements that take part: chi-square below the 99.9 % quantile. The rounds end
 // early where that choice is the last one's.
 //
 // Covariance of a measurement's residual: sigma^2 I + J_rho J_rho' sigma_rho^2, so that an uncertain depth
 // does not pull the pose along its epipolar line. The prior adds 0.5 r' information r with r of
 // prior_residual; zero information adds nothing. Fewer than 6 inliers give ok = false, whatever the prior.
-[[nodiscard]] PoseSolution solve_pose(const Rig& rig, const PosePrior& prior,
+[[nodiscard]] PoseSolution solve_pose(const Rig& rig, const PosePrior& prior, const SE3& T_world_body_start,
                                       std::span<PoseMeasurement> measurements, int rounds = 4);
-// The same from a start without information.
+// The same from the prior's pose.
+[[nodiscard]] inline PoseSolution solve_pose(const Rig& rig, const PosePrior& prior,
+                                             std::span<PoseMeasurement> measurements, int rounds = 4) {
+  return solve_pose(rig, prior, prior.T_world_body, measurements, rounds);
+}
+// The same from a start without a prior.
 [[nodiscard]] inline PoseSolution solve_pose(const Rig& rig, const SE3& T_world_body_start,
                                              std::span<PoseMeasurement> measurements, int rounds = 4) {
-  return solve_pose(rig, PosePrior{T_world_body_start, Matrix6d::Zero()}, measurements, rounds);
+  return solve_pose(rig, PosePrior{}, T_world_body_start, measurements, rounds);
 }
 
 // Residual of a pose against an expected one, T_prior.boxminus_to(T_world_body), and its derivative by the

@@ -37,10 +37,11 @@ std::size_t Tracker::bytes() const {
          capacity_bytes(last_seen_) + capacity_bytes(confirmed_seen_);
 }
 
-void Tracker::set_view(std::shared_ptr<const LocalView> view) {
-  if (matcher_.view()) motion_.correct(*matcher_.view(), *view);
+double Tracker::set_view(std::shared_ptr<const LocalView> view) {
+  const double scale = matcher_.view() ? motion_.correct(*matcher_.view(), *view) : 1.0;
   matcher_.set_view(std::move(view));
   matcher_.mark_seen(last_seen_);
+  return scale;
 }
 
 void Tracker::adopt(std::shared_ptr<const LocalView> view, std::span<const LandmarkHandle> seen) {
@@ -58,20 +59,20 @@ void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
 
 TrackOutcome Tracker::track(const Frame& frame) {
   const MotionModel& model = motion_model_ != nullptr ? *motion_model_ : motion_;
-  return track_from(frame, model.predict(frame.utime).T_world_body);
+  return track_from(frame, model.predict(frame.utime));
 }
 
-TrackOutcome Tracker::track_from(const Frame& frame, const SE3& T_world_body_prior) {
+TrackOutcome Tracker::track_from(const Frame& frame, const PosePrior& prior) {
   matcher_.begin(frame);
   if (!matcher_.view()) return {};
-  SE3 T_world_body = T_world_body_prior;
-  if (!coarse_pose(frame, &T_world_body)) return {};
-  return refiner_.refine(frame, T_world_body);
+  SE3 T_world_body;
+  if (!coarse_pose(frame, prior, &T_world_body)) return {};
+  return refiner_.refine(frame, T_world_body, prior);
 }
 
 // Searches the landmarks of the last frame around the prior, then in a wider window, then those of the whole
 // view.
-bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
+bool Tracker::coarse_pose(const Frame& frame, const PosePrior& prior, SE3* T_world_body) {
   const double base_px = config_.prior_search_px;
   struct Attempt {
     double radius_px;
@@ -83,11 +84,11 @@ bool Tracker::coarse_pose(const Frame& frame, SE3* T_world_body) {
                               {4.0 * base_px, LandmarkSubset::kAll}};
   std::optional<LandmarkSubset> projected;
   for (const Attempt& a : attempts) {
-    if (projected != a.subset) matcher_.project(frame, *T_world_body, a.subset);
+    if (projected != a.subset) matcher_.project(frame, prior.T_world_body, a.subset);
     projected = a.subset;
     matcher_.begin(frame);
     if (matcher_.match(frame, a.radius_px, kPriorRatio) < config_.min_matches) continue;
-    const PoseSolution s = refiner_.solve(*T_world_body);
+    const PoseSolution s = refiner_.solve(prior.T_world_body, prior);
     if (!explains_matches(s)) continue;
     *T_world_body = s.T_world_body;
     return true;

@@ -36,8 +36,9 @@ class Tracker {
   // frames.
   void use_motion_model(const MotionModel* model) { motion_model_ = model; }
 
-  // Takes a newer view. Pose and motion prior follow the newest keyframe that both views contain.
-  void set_view(std::shared_ptr<const LocalView> view);
+  // Takes a newer view. Pose and motion prior follow the newest keyframe that both views contain, in the unit
+  // of the newer view. Returns the change of unit (ConstantVelocity::correct); 1 for the first view.
+  double set_view(std::shared_ptr<const LocalView> view);
   [[nodiscard]] const LocalView* view() const { return matcher_.view().get(); }
   [[nodiscard]] std::shared_ptr<const LocalView> shared_view() const { return matcher_.view(); }
   // Takes another tracker's view and the landmarks that its newest frame saw, for track_from(). Null lets go
@@ -48,9 +49,13 @@ class Tracker {
   void start(const SE3& T_world_body, std::int64_t utime);
 
   // Pose of the frame from the motion prior: first from the last frame's landmarks, then from the local map.
+  // The prior's information weighs beside the images'.
   TrackOutcome track(const Frame& frame);
   // The same from a given prior; leaves the accepted poses alone.
-  TrackOutcome track_from(const Frame& frame, const SE3& T_world_body_prior);
+  TrackOutcome track_from(const Frame& frame, const PosePrior& prior);
+  TrackOutcome track_from(const Frame& frame, const SE3& T_world_body_prior) {
+    return track_from(frame, PosePrior{T_world_body_prior, Matrix6d::Zero()});
+  }
   // Pose of a frame after frames without one, from the last confirmed motion (Relocaliser). Not ok where the
   // landmarks found contradict each other.
   TrackOutcome relocalise(const Frame& frame);
@@ -77,7 +82,7 @@ class Tracker {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  bool coarse_pose(const Frame& frame, SE3* T_world_body);
+  bool coarse_pose(const Frame& frame, const PosePrior& prior, SE3* T_world_body);
   [[nodiscard]] bool explains_matches(const PoseSolution& solution) const;
   void note_seen();
 

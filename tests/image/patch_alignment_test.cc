@@ -198,7 +198,7 @@ TEST(Align, ToleratesGainAndOffset) {
   EXPECT_LT(e.rms, 0.08);
 }
 
-// Error and claim scale with the noise: a doubled noise may not leave the claim where it was.
+// Error and reported sigma scale with the noise.
 TEST(Align, TheClaimedErrorGrowsWithTheNoise) {
   const testing::Texture texture(6, 7.0, 20);
   double previous = 0;
@@ -285,7 +285,7 @@ TEST_P(AlignRecorded, ChangesOfScaleAreMeasuredWithinTheClaim) {
         kIdentity* static_cast<float>(ratio), 0.5);
     ASSERT_GT(e.tried, 100);
     EXPECT_GT(e.ok, 0.9 * e.tried);
-    // A mean of so many errors is itself uncertain.
+    // The mean of e.ok errors is uncertain itself.
     const double uncertainty = e.rms / std::sqrt(e.ok);
     EXPECT_LT(std::abs(e.bias_x), 0.02 + 2 * uncertainty);
     EXPECT_LT(std::abs(e.bias_y), 0.02 + 2 * uncertainty);

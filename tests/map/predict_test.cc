@@ -24,7 +24,7 @@ struct Sight {
 
 class PredictTest : public testing::Test {
  protected:
-  // The pixel by nothing but geometry.
+  // The pixel, by geometry alone.
   std::optional<Eigen::Vector2d> pixel_of(const Sight& s, const Eigen::Vector2d& host_pixel,
                                           double rho) const {
     Eigen::Vector3d f;

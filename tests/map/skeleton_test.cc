@@ -25,7 +25,7 @@ class SkeletonTest : public testing::Test {
   void remove(Skeleton* skeleton, KeyframeHandle h, KeyframeHandle parent) {
     const Keyframe& k = keyframes[h];
     const Keyframe& p = keyframes[parent];
-    skeleton->remove(k.id, p.id, p.T_world_body.inverse() * k.T_world_body);
+    skeleton->remove(k.id, p.id, p.S_world_body().inverse() * k.S_world_body());
     keyframes.release(h);
   }
 
@@ -58,6 +58,26 @@ TEST_F(SkeletonTest, TheRemovedMoveWithTheirParents) {
   keyframes[c].T_world_body = random_pose(&random);
   ASSERT_TRUE(all.pose_of(1, keyframes, &T));
   expect_same_pose(T, keyframes[c].T_world_body * T_c_b * T_b_a);
+}
+
+// A pose relative to a removed keyframe keeps that keyframe's unit, whatever units it and its parents had.
+TEST_F(SkeletonTest, TheRemovedFollowTheUnitsOfTheirParents) {
+  const KeyframeHandle a = add(&all), b = add(&all), c = add(&all);
+  keyframes[a].scale = 3.0, keyframes[b].scale = 1.5;
+  const Sim3 S_world_a = keyframes[a].S_world_body();
+  remove(&all, a, b);
+  remove(&all, b, c);
+  const Sim3 S{2.0, so3_exp({0.3, 0.1, -0.4}), {1, 2, 3}};
+  keyframes[c].T_world_body = S * keyframes[c].T_world_body;
+  keyframes[c].scale *= S.scale;
+  Sim3 moved;
+  ASSERT_TRUE(all.similarity_of(1, keyframes, &moved));
+  EXPECT_NEAR(moved.scale, 6.0, 1e-12);
+  const SE3 T_a_frame{so3_exp({0, 0, 0.2}), {0.3, 0.1, 0}};
+  expect_same_pose(moved * T_a_frame, S * (S_world_a * T_a_frame));
+  SE3 T;
+  ASSERT_TRUE(all.pose_of(1, keyframes, &T));
+  expect_same_pose(T, S * SE3{S_world_a.q, S_world_a.t});
 }
 
 TEST_F(SkeletonTest, WithoutAParentThePoseIsLostAndWithItWhatHangsOnIt) {
@@ -93,7 +113,7 @@ TEST_F(SkeletonTest, BoundedKeepsTheNewest) {
   ASSERT_TRUE(bounded.pose_of(1, keyframes, &T));
   expect_same_pose(T, keyframes[living].T_world_body);
   // Its removal can no longer be noted, and those attached to it are lost with it.
-  bounded.remove(1, 101, SE3{});
+  bounded.remove(1, 101, Sim3{});
   keyframes.release(living);
   EXPECT_FALSE(bounded.pose_of(1, keyframes, &T));
   EXPECT_FALSE(bounded.pose_of(101, keyframes, &T));

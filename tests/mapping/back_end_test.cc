@@ -213,6 +213,27 @@ TEST_F(BackEndTest, PosesFramesFromBeforeTheMap) {
   }
 }
 
+// The map has another unit since the view was made: the frames are posed in the view's, and follow.
+TEST_F(BackEndTest, PosesFramesAgainstAViewInAnOlderUnit) {
+  const auto view = started();
+  ASSERT_TRUE(view);
+  record(0, 1, 1), record(100000, 1, 2);
+  MappingJob* job = begin(MappingJobKind::kPoseFrames);
+  const SE3 before{so3_exp({0.0, 0.0, -0.004}), {-0.05, -0.03, 0.01}};
+  job->last_before_map = 4;
+  job->frames = {world.frame(before, 3)};
+  job->view = view;
+  rings.jobs.end_push();
+  const Sim3 S{2.0, so3_exp({0.1, 0.2, 0.9}), {3, -2, 1}};
+  side.transform_map(1, S);
+  step();
+  ASSERT_EQ(side.recorded().size(), 3U);
+  Sim3 S_world_reference;
+  ASSERT_TRUE(side.mapper().map().similarity_of(side.recorded()[2].reference_id, &S_world_reference));
+  const SE3 T = S_world_reference * side.recorded()[2].T_reference_body();
+  EXPECT_LT(T.boxminus_to(S * before).norm(), 1e-2);
+}
+
 TEST_F(BackEndTest, PosesNoFramesOfAMapThatHasGone) {
   const auto view = started();
   MappingJob* job = begin(MappingJobKind::kPoseFrames);

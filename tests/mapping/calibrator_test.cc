@@ -8,7 +8,7 @@
 namespace farpoint::slam {
 namespace {
 
-// A scene whose map believes in a camera that is wrong by `truth`, refined as mapping does it.
+// A scene whose map has a camera that is wrong by `truth`, refined as mapping does it.
 class CalibratedScene {
  public:
   // Camera `index` of the rig is wrong; any others are right.
@@ -32,7 +32,7 @@ class CalibratedScene {
     }
   }
 
-  // One keyframe's turn: local BA with the camera believed in, then the refinement. True where it moved.
+  // One keyframe: local BA with the present camera, then the refinement. True where it changed the camera.
   bool turn() {
     scene_.rig.cameras[index_].camera = calibrator_.camera();
     const Camera& camera = scene_.rig.cameras[index_].camera;
@@ -115,7 +115,7 @@ TEST(Calibrator, ALargeErrorContradictsTheGivenCamera) {
   CalibratedScene scene(CalibrationDelta(0.1, 0.0, 0.0, 0.0), 3);
   for (int i = 0; i < 8; ++i) scene.turn();
   EXPECT_TRUE(scene.calibrator().contradicts_given()) << scene.calibrator().surprise();
-  // What the first windows said, before the map had followed, is remembered too.
+  // The first windows count too: the map had not followed yet.
   EXPECT_GT(scene.calibrator().wanted_by_images()[0], 0.05);
   EXPECT_LT(scene.calibrator().wanted_by_images()[0], 0.15);
 }

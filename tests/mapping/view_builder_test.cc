@@ -50,6 +50,20 @@ TEST(ViewBuilder, KeyframesHaveTheirOwnPosesByAscendingId) {
   }
 }
 
+TEST(ViewBuilder, KeyframesHaveTheirOwnScales) {
+  Drive d;
+  ViewBuilder builder(d.w.config, &d.w.map);
+  d.w.map.correct_keyframe(d.k[1], {2.0, Eigen::Quaterniond::Identity(), {0, 0, 0}});
+  d.w.map.correct_keyframe(d.k[3], {3.0, Eigen::Quaterniond::Identity(), {0, 0, 0}});
+  const auto view = builder.build(d.k[3], true);
+  ASSERT_EQ(view->keyframes.size(), 4U);
+  EXPECT_EQ(view->keyframes[0].scale, 1.0);
+  EXPECT_EQ(view->keyframes[1].scale, 2.0);
+  EXPECT_EQ(view->keyframes[3].scale, 3.0);
+  EXPECT_EQ(view->reference_scale, 3.0);
+  EXPECT_EQ(builder.build(d.k[1], true)->S_world_reference().scale, 2.0);
+}
+
 TEST(ViewBuilder, EveryLandmarkAppearsOnceAndInItsPlace) {
   Drive d;
   ViewBuilder builder(d.w.config, &d.w.map);

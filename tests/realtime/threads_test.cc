@@ -2,14 +2,18 @@
 // Threaded replay of recordings: no heap on the threads that must not wait for it, and a run that repeats.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/replay.h"
+#include "ipc/image_codec.h"
 #include "ipc/log.h"
+#include "ipc/message.h"
 #include "tests/ipc/allocations.h"
 #include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
@@ -21,8 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Faster than the camera, so that the test is short; frames may be dropped. Not for KITTI: a map that is lost
-// because mapping has no time to follow is looked for anew, and that may use the heap.
+// Faster than the camera, so that the test is short; frames may be dropped.
 constexpr double kFast = 4.0, kCameraSpeed = 1.0;
 
 Options threaded(const test::Scratch& scratch, const std::string& log, double speed = kFast) {
@@ -53,6 +56,18 @@ ThreadHooks watch_from_settled(bool* watched) {
   return hooks;
 }
 
+// Of the threads that must not call the heap, while it was watched.
+void expect_no_heap_calls_so_far() {
+  std::uint64_t calls = 0;
+  for (const char* name : {Pipeline::kCaptureThread, Pipeline::kTrackingThread, Pipeline::kOutputThread}) {
+    EXPECT_EQ(test::heap_calls(name), 0U) << name;
+    calls += test::heap_calls(name);
+  }
+  if (calls > 0) test::print_heap_calls();
+  // The watch works: mapping does allocate.
+  EXPECT_GT(test::heap_calls(Pipeline::kMappingThread), 0U);
+}
+
 void expect_no_heap_calls(const std::string& recording, double speed) {
   if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
   if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
@@ -64,14 +79,7 @@ void expect_no_heap_calls(const std::string& recording, double speed) {
   test::stop_watching_heap();
   EXPECT_EQ(status, 0);
   EXPECT_TRUE(watched);
-  std::uint64_t calls = 0;
-  for (const char* name : {Pipeline::kCaptureThread, Pipeline::kTrackingThread, Pipeline::kOutputThread}) {
-    EXPECT_EQ(test::heap_calls(name), 0U) << name;
-    calls += test::heap_calls(name);
-  }
-  if (calls > 0) test::print_heap_calls();
-  // The watch works: mapping does allocate.
-  EXPECT_GT(test::heap_calls(Pipeline::kMappingThread), 0U);
+  expect_no_heap_calls_so_far();
 }
 
 TEST(RecordedThreads, NoHeapOnKittiAfterSettling) {
@@ -80,6 +88,77 @@ TEST(RecordedThreads, NoHeapOnKittiAfterSettling) {
 
 TEST(RecordedThreads, NoHeapOnEurocAfterSettling) {
   expect_no_heap_calls("euroc {}/euroc/MH_01_part", kFast);
+}
+
+// What a recording shows instead of its images.
+enum class Disturbance : std::uint8_t { kNone, kBlack, kUpsideDown };
+
+// Three dark stretches that end in the same map, and two changes of place: upside down, and back.
+Disturbance disturbance_at(double time_s) {
+  for (const double dark_s : {3.4, 5.0, 6.6})
+    if (time_s >= dark_s && time_s < dark_s + 0.6) return Disturbance::kBlack;
+  return time_s >= 8.0 && time_s < 12.5 ? Disturbance::kUpsideDown : Disturbance::kNone;
+}
+
+void disturb(image_t* image, Disturbance disturbance) {
+  ipc::ImageDecoder decoder;
+  ipc::GreyImage grey;
+  ASSERT_EQ(decoder.decode(*image, &grey), ipc::ImageStatus::kOk);
+  if (disturbance == Disturbance::kBlack)
+    std::fill(grey.pixels.begin(), grey.pixels.end(), std::uint8_t{0});
+  else
+    std::reverse(grey.pixels.begin(), grey.pixels.end());
+  image->pixel_format = image_t::PIXEL_FORMAT_GREY;
+  image->row_stride = 0;
+  image->data.assign(grey.pixels.begin(), grey.pixels.end());
+  image->size = static_cast<std::int32_t>(image->data.size());
+}
+
+void write_disturbed(const std::string& from, const std::string& to) {
+  ipc::LogReader reader(from);
+  ipc::LogWriter writer(to);
+  ipc::LogEvent event;
+  std::optional<std::int64_t> first_utime;
+  while (reader.next(&event)) {
+    if (event.channel != "CAMERA_0") {
+      if (event.channel != "CAMERA_1") writer.write(event.channel, event.timestamp_us, event.data);
+      continue;
+    }
+    image_t image;
+    ASSERT_TRUE(ipc::decode(event.data, &image));
+    if (!first_utime) first_utime = image.utime;
+    const auto disturbance = disturbance_at(1e-6 * static_cast<double>(image.utime - *first_utime));
+    if (disturbance != Disturbance::kNone) disturb(&image, disturbance);
+    writer.write_message(event.channel, event.timestamp_us, image);
+  }
+  writer.close();
+}
+
+// Relocalisation and the search for a first map included, from the decoder's first images on.
+TEST(RecordedThreads, NoHeapOverFiveLossesAndTwoNewMaps) {
+  if (!fs::exists(test::kData)) GTEST_SKIP() << "no recordings in " << test::kData;
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
+  constexpr int kDecodersFirstImages = 5;
+  const test::Scratch scratch;
+  const std::string log = scratch.path("run.lcm"), disturbed = scratch.path("disturbed.lcm");
+  ASSERT_TRUE(test::import_recording("euroc {}/euroc/MH_01_part", log));
+  ASSERT_NO_FATAL_FAILURE(write_disturbed(log, disturbed));
+  int frames = 0, losses = 0;
+  std::int32_t map_id = 0;
+  bool was_tracked = false;
+  ThreadHooks hooks;
+  hooks.on_output = [&](const FrameOutput& frame) {
+    if (++frames == kDecodersFirstImages) test::watch_heap();
+    const bool is_tracked = frame.result.has_pose;
+    losses += was_tracked && !is_tracked ? 1 : 0;
+    was_tracked = is_tracked;
+    map_id = std::max(map_id, frame.result.map_id);
+  };
+  EXPECT_EQ(replay(threaded(scratch, disturbed, kCameraSpeed), quiet_config(), hooks), 0);
+  test::stop_watching_heap();
+  expect_no_heap_calls_so_far();
+  EXPECT_GE(losses, 5);
+  EXPECT_GE(map_id, 3);
 }
 
 TEST(RecordedThreads, APlantedMallocIsFound) {

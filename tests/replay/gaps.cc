@@ -51,17 +51,38 @@ void keep_worst(const MotionError& error, MotionError* worst) {
   worst->rotation_deg = std::max(worst->rotation_deg, error.rotation_deg);
 }
 
-// Metres a map unit, by the valid poses of a frame's map up to that frame. Empty where there are too few.
-std::optional<double> scale_at(const std::vector<TrackedFrame>& frames, const TrackedFrame& frame) {
+// Metres a map unit, by the valid poses of one map up to a time. Empty where there are too few.
+std::optional<double> scale_of(const std::vector<TrackedFrame>& frames, std::int32_t map_id, double until_s) {
   std::vector<Eigen::Vector3d> told, truth;
   for (const TrackedFrame& f : frames) {
-    if (!f.valid() || f.map_id != frame.map_id || f.time_s > frame.time_s) continue;
+    if (!f.valid() || f.map_id != map_id || f.time_s > until_s) continue;
     told.push_back(f.T_map_body.t);
     truth.push_back(f.T_truth_body.t);
   }
   const slam::PointAlignment a = slam::align_points(told, truth, slam::AlignmentKind::kSim3);
   if (!a.ok) return {};
   return a.S_target_source.scale;
+}
+
+std::optional<double> scale_at(const std::vector<TrackedFrame>& frames, const TrackedFrame& frame) {
+  return scale_of(frames, frame.map_id, frame.time_s);
+}
+
+// Of odometry's motion between two frames of one map.
+double odometry_error_m(const TrackedFrame& a, const TrackedFrame& b, double scale) {
+  return motion_error(a.T_odom_body, b.T_odom_body, a.T_truth_body, b.T_truth_body, scale).translation_m;
+}
+
+// Length of the true path from one frame to a later one, along the poses of `frames` in between.
+double true_way_m(const std::vector<TrackedFrame>& frames, const TrackedFrame& from, const TrackedFrame& to) {
+  double way_m = 0.0;
+  const TrackedFrame* last = &from;
+  for (const TrackedFrame& f : frames) {
+    if (f.time_s <= from.time_s || f.time_s > to.time_s) continue;
+    way_m += (f.T_truth_body.t - last->T_truth_body.t).norm();
+    last = &f;
+  }
+  return way_m;
 }
 
 const TrackedFrame* frame_at(const std::vector<TrackedFrame>& frames, double time_s) {
@@ -125,16 +146,15 @@ bool GapOutcome::seen_before() const {
   return landmarks_after >= kSharedLandmarks && landmarks_after >= kSharedView * landmarks_before;
 }
 
-std::vector<std::vector<Gap>> spread_gaps(double first_s, double last_s, int count, double apart_s) {
-  constexpr double kLengths_s[] = {0.5, 1.0, 1.5, 2.0};
-  const double step_s = (last_s - first_s) / std::max(1, count - 1);
-  const int replays = std::max(1, static_cast<int>(std::ceil(apart_s / step_s)));
+std::vector<std::vector<Gap>> spread_gaps(const GapSpread& spread) {
+  const double step_s = (spread.last_s - spread.first_s) / std::max(1, spread.count - 1);
+  const int replays = std::max(1, static_cast<int>(std::ceil(spread.apart_s / step_s)));
   std::vector<std::vector<Gap>> out(static_cast<std::size_t>(replays));
-  for (int i = 0; i < count; ++i) {
+  for (int i = 0; i < spread.count; ++i) {
     const GapKind kind = i % 2 == 0 ? GapKind::kMissing : GapKind::kBlack;
     // Every length with either kind.
-    const double length_s = kLengths_s[static_cast<std::size_t>(i / 2) % std::size(kLengths_s)];
-    out[static_cast<std::size_t>(i % replays)].push_back({kind, first_s + i * step_s, length_s});
+    const double length_s = spread.lengths_s[static_cast<std::size_t>(i / 2) % spread.lengths_s.size()];
+    out[static_cast<std::size_t>(i % replays)].push_back({kind, spread.first_s + i * step_s, length_s});
   }
   return out;
 }
@@ -175,8 +195,8 @@ std::vector<TrackedFrame> GapExperiment::replay(const std::vector<Gap>& gaps,
       image.data = black.data();
     }
     const slam::FrameResult& r = estimator.process({frame.utime, frame.sequence, 0, image});
-    out.push_back(
-        {time_s, r.state, r.map_id, r.T_map_body, nearest_truth(truth, tools::seconds_of(frame.utime))});
+    out.push_back({time_s, r.state, r.map_id, r.T_map_body, r.T_odom_body,
+                   nearest_truth(truth, tools::seconds_of(frame.utime)), r.reset_counter});
   } while (source.next(&frame, &clock));
   return out;
 }
@@ -199,6 +219,32 @@ void GapExperiment::judge_pose(const TrackedFrame& before, const TrackedFrame& f
   keep_worst(without, &outcome->error_without);
 }
 
+OdometryOverGap GapExperiment::judge_odometry(const std::vector<TrackedFrame>& frames, const Gap& gap) const {
+  OdometryOverGap out;
+  const auto begin = std::find_if(frames.begin(), frames.end(),
+                                  [&](const TrackedFrame& f) { return f.time_s >= gap.start_s; });
+  const auto before = std::find_if(std::make_reverse_iterator(begin), frames.rend(),
+                                   [](const TrackedFrame& f) { return f.valid(); });
+  const auto after = std::find_if(begin, frames.end(), [&](const TrackedFrame& f) {
+    return f.valid() && f.time_s >= gap.start_s + gap.length_s;
+  });
+  if (before == frames.rend() || after == frames.end()) return out;
+  const std::optional<double> scale =
+      scale_of(frames, before->map_id, std::numeric_limits<double>::infinity());
+  if (!scale) return out;
+  out.judged = true;
+  out.reset = after->reset_counter != before->reset_counter;
+  out.silent_s = after->time_s - before->time_s;
+  // The frames of the replay without gaps are all there.
+  out.way_m = true_way_m(whole_, *before, *after);
+  out.error_m = odometry_error_m(*before, *after, *scale);
+  const TrackedFrame *a = frame_at(whole_, before->time_s), *b = frame_at(whole_, after->time_s);
+  if (a == nullptr || b == nullptr || !a->valid() || !b->valid() || a->map_id != b->map_id) return out;
+  if (const auto whole = scale_of(whole_, a->map_id, std::numeric_limits<double>::infinity()))
+    out.error_without_m = odometry_error_m(*a, *b, *whole);
+  return out;
+}
+
 std::vector<GapOutcome> GapExperiment::run(const std::vector<Gap>& gaps) const {
   std::vector<Snapshot> snapshots;
   const std::vector<TrackedFrame> frames = replay(gaps, &snapshots);
@@ -206,6 +252,7 @@ std::vector<GapOutcome> GapExperiment::run(const std::vector<Gap>& gaps) const {
   for (std::size_t g = 0; g < snapshots.size(); ++g) {
     GapOutcome& o = out.emplace_back();
     o.gap = gaps[g];
+    o.odometry = judge_odometry(frames, o.gap);
     const double end_s = o.gap.start_s + o.gap.length_s;
     const double next_s = g + 1 < gaps.size() ? gaps[g + 1].start_s : std::numeric_limits<double>::infinity();
     o.wrong_poses = static_cast<int>(std::count_if(frames.begin(), frames.end(), [&](const TrackedFrame& f) {
@@ -233,10 +280,13 @@ std::vector<GapOutcome> GapExperiment::run(const std::vector<Gap>& gaps) const {
   return out;
 }
 
+std::string to_text(const Gap& gap) {
+  return fmt::format("{:7} {:5.2f} s +{:.1f} s", gap.kind == GapKind::kMissing ? "missing" : "black",
+                     gap.start_s, gap.length_s);
+}
+
 std::string to_text(const GapOutcome& o) {
-  const std::string gap =
-      fmt::format("{:7} {:5.2f} s +{:.1f} s", o.gap.kind == GapKind::kMissing ? "missing" : "black",
-                  o.gap.start_s, o.gap.length_s);
+  const std::string gap = to_text(o.gap);
   if (!o.tracked_before) return gap + ": no pose before it";
   return gap + fmt::format(
                    ": moved {:.2f} m {:.1f} deg, landmarks {} -> {} ({}), back after {:.2f} s, {} poses, "
@@ -245,6 +295,16 @@ std::string to_text(const GapOutcome& o) {
                    o.seen_before() ? "seen before" : "new", o.back_after_s, o.poses, o.error.translation_m,
                    o.error.rotation_deg, o.error_without.translation_m, o.error_without.rotation_deg,
                    o.wrong_poses);
+}
+
+std::string odometry_to_text(const GapOutcome& outcome) {
+  const OdometryOverGap& o = outcome.odometry;
+  const std::string gap = to_text(outcome.gap);
+  if (!o.judged) return gap + ": no valid frame before or after it";
+  return gap +
+         fmt::format(": silent {:.2f} s, way {:.2f} m, odometry off by {:.3f} m ({:.3f} without the gap), {}",
+                     o.silent_s, o.way_m, o.error_m, o.error_without_m,
+                     o.reset ? "counter rose" : (o.kept() ? "kept" : "LOST"));
 }
 
 }  // namespace farpoint::test

@@ -44,7 +44,7 @@ class RecordedGaps : public testing::TestWithParam<Recording> {
     const GapExperiment experiment(log(), until_s);
     Sum sum;
     for (const std::vector<Gap>& gaps :
-         spread_gaps(GetParam().first_s, experiment.length_s() - kJudged_s, places, GetParam().apart_s)) {
+         spread_gaps({GetParam().first_s, experiment.length_s() - kJudged_s, places, GetParam().apart_s})) {
       for (const GapOutcome& o : experiment.run(gaps)) {
         std::printf("%s\n", to_text(o).c_str());
         ++sum.places;

@@ -35,8 +35,7 @@ slam::Rig plain_rig() {
   return rig;
 }
 
-// A point that keyframes see; which one of several that look alike, and on which level, may be chosen each
-// time.
+// A point that keyframes see. Each sighting may choose another of several that look alike, and its level.
 struct Corner {
   std::uint32_t id = 0;
   Vector3d position = Vector3d::Zero();
@@ -76,7 +75,7 @@ class LandmarkMakerTest : public ::testing::Test {
     scaffold_.clear();
     scaffold_landmarks_.clear();
     frames_ = 0;
-    // A dozen points 20 m away tell the maker how deep the scene is.
+    // A dozen points 20 m away give the maker the depth of the scene.
     for (std::uint32_t i = 0; i < 12; ++i) {
       const std::uint32_t column = i % 4, row = i / 4;
       scaffold_.push_back({kScaffold + i, {-6.0 + 4.0 * column, -4.0 + 4.0 * row, 20.0}});
@@ -237,7 +236,7 @@ TEST_F(LandmarkMakerTest, APairThatOtherKeyframesDoNotBearOutWaitsAsAVirtualPoin
   EXPECT_EQ(landmark(b, kNear.id)->state, LandmarkState::kBearing);
   EXPECT_EQ(counts_.landmarks_made, 0U);
   EXPECT_EQ(counts_.vmp_made, 1U);
-  // A third sighting that agrees is as good as a keyframe that bears it out.
+  // A third sighting that agrees confirms as much as a keyframe.
   const KeyframeHandle e = look(1.3, {kNear});
   maker_->process(e, {b, a, c, d});
   ASSERT_NE(landmark(e, kNear.id), nullptr);
@@ -254,7 +253,7 @@ TEST_F(LandmarkMakerTest, TheBaselineDropsAPairThatOtherKeyframesDoNotBearOut) {
   EXPECT_EQ(counts_.landmarks_made, 0U);
 }
 
-// Hidden in two of three: still a point. Where nobody else looks there is nobody to ask.
+// Hidden in two of three: still a point. So it is where no other keyframe looks.
 TEST_F(LandmarkMakerTest, OneKeyframeInThreeBearsAPairOut) {
   const KeyframeHandle a = look(0.0, {kNear}), c = look(0.3, {}), d = look(0.6, {}), e = look(0.8, {kNear}),
                        b = look(1.0, {kNear});
@@ -324,7 +323,7 @@ TEST_F(LandmarkMakerTest, TwoVirtualPointsOfOneLandmarkMerge) {
 }
 
 TEST_F(LandmarkMakerTest, OnesThatOnlyLookAlikeDoNotMerge) {
-  // The same descriptor 3 px apart; patches tell them apart.
+  // The same descriptor 3 px apart; the patches differ.
   image_.noise.alike_alignment = 0.0;
   Corner twin = kVeryFar;
   twin.id = 9, twin.look = kVeryFar.id, twin.group = 7;
@@ -494,7 +493,7 @@ TEST_F(LandmarkMakerTest, DepthsAreRightForTheirSigmaOverManyPoints) {
   outside /= static_cast<double>(z.size()), square /= static_cast<double>(z.size());
   std::printf("normalised depth error: mean square %.3f, %.1f %% beyond 1.96 sigma, %zu points\n", square,
               100 * outside, z.size());
-  // Never overconfident; and not so careful that the sigma says nothing.
+  // Never overconfident; nor so large that the sigma is of no use.
   EXPECT_LT(outside, 0.06);
   EXPECT_LT(square, 1.1);
   EXPECT_GT(square, 0.15);

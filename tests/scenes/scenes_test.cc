@@ -2,7 +2,7 @@
 // The estimator in simulated worlds: initialisation, life of virtual map points, scale, forgetting, sigma,
 // modes.
 //
-// Bounds are set from the spread over seeds that sim_compare printed; each says what was seen.
+// Bounds follow the spread over seeds that sim_compare printed; each comment holds what was seen.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,7 +97,7 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
                   EXPECT_GE(c.mapping.vmp_promoted, before.mapping.vmp_promoted);
                   EXPECT_GE(c.mapping.vmp_evicted, before.mapping.vmp_evicted);
                   before = c;
-                  // Counts come with mapping's replies: they are of the map as it is where no job is under
+                  // Counts come with mapping's replies: they are of the present map where no job is under
                   // way.
                   if (frame < 20 || result.jobs_under_way > 0) return;
                   ++compared;
@@ -116,7 +116,7 @@ TEST(VirtualPoints, AllOfTheirLifeHappensAndTheCountsBalance) {
                   EXPECT_LE(virtual_points + c.mapping.vmp_merged + c.mapping.vmp_promoted +
                                 c.mapping.vmp_rejected + c.mapping.vmp_evicted,
                             c.mapping.vmp_made);
-                  // The facade says how many are alive.
+                  // The facade counts those alive.
                   EXPECT_EQ(virtual_points, c.mapping.vmp_alive) << "frame " << frame;
                 });
   EXPECT_GT(compared, 5);
@@ -203,9 +203,9 @@ TEST(Sigma, DepthErrorsAreWhatIsClaimed) {
 // -----------------------------------------------------------------------------------------------------------
 // modes
 
-// The short form of sim_compare. Depths are told apart by every seed. The error is not: at the simulator's
-// noise it is a few centimetres and varies by a factor of two from seed to seed, so that here it only must
-// not be far worse.
+// The short form of sim_compare. Every seed separates the depths. The errors are a few centimetres at the
+// simulator's noise and vary by a factor of two from seed to seed: here the error must only not be far
+// worse.
 TEST(Modes, VirtualPointsReachFurther) {
   for (const char* name : {"straight", "hovering"}) {
     const Scene scene = shortened(name, name[0] == 's' ? 150 : 600);

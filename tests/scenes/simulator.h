@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns a scene into what the image processing would have handed to the estimator, frame by frame, with the
+// Turns a scene into the features that the image processing would have made, frame by frame, with the
 // truth.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace farpoint::sim {
 
-// What a host patch carries instead of pixels.
+// Content of a host patch, instead of pixels.
 struct PatchPayload {
   std::uint32_t point = 0;     // id of the true point; kNothing and above: an outlier
   std::uint32_t frame = 0;     // in which the patch was cut: where the landmark is anchored
@@ -22,7 +22,7 @@ struct PatchPayload {
 };
 constexpr std::uint32_t kNothing = 0xE0000000U;
 
-// The pixels behind a simulated frame: knows where every visible point projects, so that alignment measures
+// The pixels of a simulated frame: holds the projection of every visible point, so that alignment measures
 // what real alignment would have measured.
 class SimImage final : public slam::FrameImage {
  public:
@@ -43,7 +43,7 @@ class SimImage final : public slam::FrameImage {
   ~SimImage() override;
   SimImage(const SimImage&) = delete;
   SimImage& operator=(const SimImage&) = delete;
-  // Images somebody still holds.
+  // Images in use.
   [[nodiscard]] static int alive();
   [[nodiscard]] bool extract_patch(const slam::FeatureSet& set, std::size_t index,
                                    slam::Patch* patch) const override;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kNodeSpacing_m = 0.5;
 constexpr double kPi = 3.14159265358979323846;
-// id = layer (3 bits, 7 is nobody's), stretch + kStretchOffset (14 bits), number (15 bits)
+// id = layer (3 bits, 7 is unused), stretch + kStretchOffset (14 bits), number (15 bits)
 constexpr int kStretchOffset = 1 << 13;
 
 std::uint32_t make_id(std::size_t layer, int stretch, std::size_t number) {

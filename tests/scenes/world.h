@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points with exact positions, generated along a path: any stretch of the world can be made again from its
-// number, so that an endless drive needs no endless memory.
+// Points with exact positions, generated along a path. Any stretch of the world is made again from its
+// number: memory does not grow with the drive.
 //
 // World axes: x forward at the start, y left, z up; the ground is z = 0. Metres.
 #pragma once
@@ -35,7 +35,7 @@ class Path {
     double length_m = 0, curvature_start = 0, curvature_end = 0;  // 1/m, left positive
   };
   enum class Beyond { kStraight, kWinding };
-  // Beyond its segments the path runs straight, or winds on for ever.
+  // Beyond its segments the path runs straight, or winds without end.
   Path(std::vector<Segment> segments, Beyond beyond, std::uint64_t seed);
 
   struct Place {

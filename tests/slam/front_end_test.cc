@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
+#include <map>
+
 #include "slam/back_end.h"
+#include "tests/ipc/allocations.h"
 #include "tests/slam/simulated_drive.h"
 
 namespace farpoint::slam {
@@ -125,6 +129,75 @@ TEST_F(FrontEndTest, AMotionOverLostFramesIsCarriedOnceTheMapTellsIt) {
   EXPECT_EQ(back.reset_counter, 1U);
 }
 
+// --- another unit
+
+class FrontEndOfARescaledMap : public FrontEndTest {
+ protected:
+  const Sim3 S_{2.0, so3_exp({0.0, 0.1, 0.9}), {3, -2, 1}};
+
+  // Tracks until a keyframe is under way to mapping, and rescales the map before it arrives.
+  void rescale_at_a_keyframe() {
+    ASSERT_TRUE(run_until_tracking());
+    while (!front_end_.track(drive_.next(), TakeLimit{}).keyframe) finish_frame();
+    back_end_.transform_map(1, S_);
+    before_ = finish_frame();
+  }
+  const FrameResult& finish_frame() {
+    work();
+    return front_end_.take_replies_at_once();
+  }
+
+  FrameResult before_;  // the last frame in the old unit
+};
+
+TEST_F(FrontEndOfARescaledMap, OdomKeepsItsUnitAndMapFromOdomTakesTheNewOne) {
+  rescale_at_a_keyframe();
+  ASSERT_EQ(before_.map_from_odom.scale, 1.0);
+  FrameResult last = before_;
+  int rescaled = 0;
+  for (int i = 0; i < 40; ++i) {
+    const FrameResult now = run(drive_.next());
+    ASSERT_TRUE(is_valid(now.state)) << i;
+    const double speed = last.velocity_body.head<3>().norm();
+    const double step = (last.T_odom_body.inverse() * now.T_odom_body).t.norm();
+    EXPECT_NEAR(step / (1e-6 * static_cast<double>(now.utime - last.utime) * speed), 1.0, 0.1) << i;
+    EXPECT_LT((now.velocity_body - last.velocity_body).norm(), 0.1 * speed) << i;
+    EXPECT_LT((now.map_from_odom * now.T_odom_body).boxminus_to(now.T_map_body).norm(), 1e-9) << i;
+    rescaled += now.map_from_odom.scale == 2.0 ? 1 : 0;
+    last = now;
+  }
+  EXPECT_GE(rescaled, 30);
+  EXPECT_EQ(last.reset_counter, 1U);
+  EXPECT_EQ(front_end_.counts().lost, 0U);
+  // The frames in the old unit lie where the whole map went.
+  EXPECT_LT((last.map_from_odom * SE3{}).boxminus_to(S_ * (before_.map_from_odom * SE3{})).norm(), 0.1);
+}
+
+// Poses relative to keyframes: those recorded before, those under way, and the keyframe itself.
+TEST_F(FrontEndOfARescaledMap, RecordedFramesAndKeyframesUnderWayFollow) {
+  rescale_at_a_keyframe();
+  for (int i = 0; i < 40; ++i) run(drive_.next());
+  back_end_.collect_recorded();
+  const Map& map = back_end_.mapper().map();
+  std::map<std::int64_t, Eigen::Vector3d> ways;  // by time
+  for (const KeptFrame& frame : back_end_.recorded()) {
+    Sim3 S_world_reference;
+    ASSERT_TRUE(map.similarity_of(frame.reference_id, &S_world_reference));
+    ways[frame.utime] = (S_world_reference * frame.T_reference_body()).t;
+  }
+  ASSERT_GT(ways.size(), 40U);
+  EXPECT_LT(ways.begin()->first, before_.utime);
+  // An even drive: no step is twice the one before it, or half of it.
+  double last_step = 0.0;
+  for (auto at = std::next(ways.begin()); at != ways.end(); ++at) {
+    const double step = (at->second - std::prev(at)->second).norm();
+    if (last_step > 0.0) {
+      EXPECT_NEAR(step / last_step, 1.0, 0.3) << at->first;
+    }
+    last_step = step;
+  }
+}
+
 TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
   ASSERT_TRUE(run_until_tracking());
   for (int i = 0; i < 30; ++i) run(drive_.next());
@@ -137,6 +210,54 @@ TEST_F(FrontEndTest, ALostSequenceBeginsANewMapAndRaisesTheResetCounter) {
   EXPECT_EQ(result->map_id, 2);
   EXPECT_EQ(result->reset_counter, 2U);
   EXPECT_EQ(front_end_.counts().maps, 2U);
+}
+
+class FrontEndHeap : public FrontEndTest {
+ protected:
+  // One frame in lockstep. Counts tracking's heap calls, and not those of mapping or of the drive.
+  FrameResult counted(FeatureInput&& input) {
+    const std::uint64_t before_tracking = test::allocations();
+    front_end_.track(std::move(input), TakeLimit{});
+    heap_calls_ += test::allocations() - before_tracking;
+    work();
+    const std::uint64_t before_replies = test::allocations();
+    const FrameResult& result = front_end_.take_replies_at_once();
+    heap_calls_ += test::allocations() - before_replies;
+    return result;
+  }
+  void track_until(State state) {
+    for (int i = 0; i < 200; ++i)
+      if (counted(drive_.next()).state == state) return;
+    FAIL() << "not " << to_string(state);
+  }
+  void lose_and_find_again() {
+    for (int i = 0; i < 8; ++i) counted(drive_.next_blind());
+    track_until(State::kTracking);
+    for (int i = 0; i < 10; ++i) counted(drive_.next());
+  }
+  void lose_the_map() {
+    for (int i = 0; i < 60; ++i)
+      if (counted(drive_.next_unknown()).state == State::kInitialising) return;
+    FAIL() << "the map was not given up";
+  }
+
+  std::uint64_t heap_calls_ = 0;
+};
+
+TEST_F(FrontEndHeap, NoCallFromTheFirstFrameOnOverFiveLossesAndTwoNewMaps) {
+  if (!test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
+  track_until(State::kTracking);
+  for (int i = 0; i < 20; ++i) counted(drive_.next());
+  for (int i = 0; i < 3; ++i) lose_and_find_again();
+  for (int i = 0; i < 2; ++i) {
+    lose_the_map();
+    track_until(State::kTracking);
+    for (int k = 0; k < 20; ++k) counted(drive_.next());
+  }
+  EXPECT_EQ(heap_calls_, 0U);
+  EXPECT_GT(test::allocations(), 0U);  // the count works
+  EXPECT_EQ(front_end_.counts().lost, 5U);
+  EXPECT_EQ(front_end_.counts().maps, 3U);
 }
 
 // Mapping is behind: it answers a keyframe of the old map after that was given up.

@@ -87,6 +87,52 @@ TEST(Odometry, MapFromOdomTakesTheBodyFromOdomToTheMap) {
   EXPECT_GT(difference(as_se3(map_from_odom), SE3{}), 1.0);
 }
 
+// The map doubles and turns: another unit, other axes, the same body.
+class OdometryOfARescaledMap : public ::testing::Test {
+ protected:
+  OdometryOfARescaledMap() {
+    odometry.advance(start);
+    odometry.advance(start * step);
+    odometry.correct(start * step, S * (start * step), S.scale);
+  }
+  const SE3 start = pose(7, 3, 1.0), step = pose(2, 1, 0.5);
+  const Sim3 S{2.0, pose(0, 0, 0.7).q, {1, -4, 0}};
+  Odometry odometry;
+};
+
+TEST_F(OdometryOfARescaledMap, KeepsItsPoseAndItsUnit) {
+  EXPECT_LT(difference(odometry.T_odom_body(), step), 1e-12);
+  odometry.advance(S * (start * step * step));
+  EXPECT_LT(difference(odometry.T_odom_body(), step * step), 1e-12);
+  EXPECT_EQ(odometry.reset_counter(), 0U);
+}
+
+TEST_F(OdometryOfARescaledMap, MapFromOdomTakesUpScaleAndCorrection) {
+  const SE3 T_map_body = S * (start * step * step);
+  odometry.advance(T_map_body);
+  const Sim3 map_from_odom = odometry.map_from_odom(T_map_body);
+  EXPECT_EQ(map_from_odom.scale, 2.0);
+  EXPECT_LT(difference(map_from_odom * odometry.T_odom_body(), T_map_body), 1e-12);
+  // The body's first pose too, which is odom's origin.
+  EXPECT_LT(difference(map_from_odom * SE3{}, S * start), 1e-12);
+}
+
+TEST_F(OdometryOfARescaledMap, PoseAddedLastMayBeAnotherThanTheOneCorrected) {
+  Odometry other;
+  other.advance(start);
+  other.correct(start * step, S * (start * step), S.scale);
+  other.advance(S * start);
+  EXPECT_LT(difference(other.T_odom_body(), SE3{}), 1e-12);
+}
+
+TEST_F(OdometryOfARescaledMap, ANewMapHasOdomsUnit) {
+  odometry.begin_map();
+  odometry.advance(start);
+  odometry.advance(start * step);
+  EXPECT_EQ(odometry.map_from_odom(start * step).scale, 1.0);
+  EXPECT_LT(difference(odometry.T_odom_body(), step * step), 1e-12);
+}
+
 TEST(Odometry, RaisesTheResetCounterWithEachMap) {
   Odometry odometry;
   EXPECT_EQ(odometry.reset_counter(), 0U);

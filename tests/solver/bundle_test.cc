@@ -378,9 +378,9 @@ SceneOptions far_scene(std::uint64_t seed) {
   return o;
 }
 
-// Gradient of the cost by everything that may move, each entry in units of its own curvature's root: how many
-// sigmas the state is away from the optimum along each axis alone. Inverse depths at zero that want below it
-// count as there.
+// Gradient of the cost by everything that may move, each entry in units of its own curvature's root. It is
+// the state's distance from the optimum along each axis alone, in sigmas. Inverse depths at zero whose
+// gradient points below zero count as optimal.
 double distance_from_optimum(const BundleProblem& p) {
   std::vector<Vector6d> pose_gradient(p.poses.size(), Vector6d::Zero());
   std::vector<Vector6d> pose_curvature(p.poses.size(), Vector6d::Zero());
@@ -446,8 +446,8 @@ TEST_P(BundleComparison, SchurAndCeresEndAtTheSamePlace) {
   EXPECT_LT(distance_from_optimum(a), 1e-3);
   const auto at_zero = [](const auto& point) { return point.inverse_depth == 0.0; };
   EXPECT_EQ(std::any_of(a.points.begin(), a.points.end(), at_zero), GetParam().bounded);
-  // At active bounds Ceres's line search ends early; it is then held to the cost alone, and to never being
-  // better.
+  // At active bounds Ceres's line search ends early: there only the costs are compared, and Ceres's must not
+  // be lower.
   EXPECT_LT(schur.final_cost, ceres.final_cost * (1.0 + 1e-9));
   EXPECT_NEAR(schur.final_cost, ceres.final_cost, (GetParam().bounded ? 1e-4 : 1e-8) * ceres.final_cost);
   EXPECT_LT(largest_shift_m(a, b), GetParam().bounded ? 5e-3 : 1e-4);
@@ -497,7 +497,7 @@ TEST(SchurSolver, NothingOfOneProblemIsLeftForTheNext) {
   }
 }
 
-// --- what evaluate_bundle says
+// --- evaluate_bundle
 // ---------------------------------------------------------------------------------------
 
 TEST(EvaluateBundle, SigmaIsRight) {

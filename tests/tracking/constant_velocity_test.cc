@@ -138,6 +138,42 @@ TEST(ConstantVelocity, PosesFollowTheNewestKeyframeThatBothViewsContain) {
   EXPECT_EQ(model.velocity_body(), velocity);  // body axes
 }
 
+// Each keyframe has a correction of its own, as after a closed loop.
+TEST(ConstantVelocity, PosesAndVelocitiesTakeTheScaleOfTheNewestCommonKeyframe) {
+  ConstantVelocity model;
+  move(&model);
+  const SE3 trial{so3_exp({0, 0, 1}), {5, 0, 0}};
+  model.accept_on_trial(trial, 3 * kFrame_us);
+  const Motion newest = model.newest(), confirmed = model.confirmed();
+  const double scale = model.correct(view_of({{1, {}, 1.0}, {2, kOld, 1.5}, {5, {}, 1.0}}),
+                                     view_of({{1, {}, 7.0}, {2, kNew, 3.0}, {6, {}, 9.0}}));
+  EXPECT_EQ(scale, 2.0);
+  const Sim3 correction = Sim3{3.0, kNew.q, kNew.t} * Sim3{1.5, kOld.q, kOld.t}.inverse();
+  EXPECT_LT(difference(model.newest().T_world_body, correction * newest.T_world_body), 1e-12);
+  EXPECT_LT(difference(model.confirmed().T_world_body, correction * confirmed.T_world_body), 1e-12);
+  EXPECT_EQ(model.newest().velocity.head<3>(), 2.0 * newest.velocity.head<3>());
+  EXPECT_EQ(model.newest().velocity.tail<3>(), newest.velocity.tail<3>());
+  EXPECT_EQ(model.confirmed().velocity.head<3>(), 2.0 * confirmed.velocity.head<3>());
+  EXPECT_EQ(model.confirmed().velocity.tail<3>(), confirmed.velocity.tail<3>());
+}
+
+TEST(ConstantVelocity, PredictsInTheNewUnit) {
+  ConstantVelocity model;
+  move(&model);
+  const Sim3 S{2.0, so3_exp({0, 0, 0.7}), {1, -4, 0}};
+  model.correct(view_of({{1, kOld, 1.0}}), view_of({{1, S * kOld, 2.0}}));
+  const SE3 predicted = kStart.boxplus(kStep).boxplus(kStep);
+  EXPECT_LT(difference(model.predict(3 * kFrame_us).T_world_body, S * predicted), 1e-12);
+}
+
+TEST(ConstantVelocity, UnitStaysWhereViewsShareNoKeyframeOrAreOfDifferentMaps) {
+  ConstantVelocity model;
+  move(&model);
+  EXPECT_EQ(model.correct(view_of({{1, kOld, 1.0}}), view_of({{2, kNew, 2.0}})), 1.0);
+  EXPECT_EQ(model.correct(view_of({{1, kOld, 1.0}}, 1), view_of({{1, kNew, 2.0}}, 2)), 1.0);
+  EXPECT_LT((model.velocity_body() - 10.0 * kStep).norm(), 1e-10);
+}
+
 TEST(ConstantVelocity, PosesStayWhereViewsShareNoKeyframeOrAreOfDifferentMaps) {
   ConstantVelocity model;
   move(&model);

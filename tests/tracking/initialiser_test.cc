@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "tests/ipc/allocations.h"
 #include "tests/support/tracking_scene.h"
 
 namespace farpoint::slam {
@@ -25,7 +26,8 @@ class InitialiserTest : public testing::Test {
   }
   std::optional<InitialPair> add(const SE3& T_world_body) {
     frames.push_back(scene.look(T_world_body, static_cast<std::int64_t>(frames.size()) * 100'000));
-    return initialiser->add(frames.back().frame);
+    const InitialPair* pair = initialiser->add(frames.back().frame);
+    return pair != nullptr ? std::optional(*pair) : std::nullopt;
   }
   [[nodiscard]] const SceneFrame& shown(const std::shared_ptr<Frame>& frame) const {
     return frames[static_cast<std::size_t>(frame->number)];
@@ -132,6 +134,26 @@ TEST_F(InitialiserTest, AClearedOneBeginsWithTheNextFrame) {
   const std::optional<InitialPair> pair = add(aside(1.6));
   ASSERT_TRUE(pair.has_value());
   EXPECT_EQ(pair->first, frames[1].frame);
+}
+
+// Waiting, a lost reference, no parallax, and a pair.
+TEST_F(InitialiserTest, MakesNoHeapCallAfterTheStart) {
+  if (!farpoint::test::counts_allocations()) GTEST_SKIP() << "a sanitizer owns the heap";
+  std::vector<SceneFrame> shown;
+  for (const double metres : {0.0, 0.01, 0.02, 0.8})
+    shown.push_back(scene.look(aside(metres), static_cast<std::int64_t>(shown.size()) * 100'000));
+  for (ScenePoint& p : scene.points)
+    for (std::uint64_t& word : p.descriptor.words) word = ~word * 0x9E3779B97F4A7C15ULL;
+  for (const double metres : {1.6, 2.4})
+    shown.push_back(scene.look(aside(metres), static_cast<std::int64_t>(shown.size()) * 100'000));
+  const std::uint64_t before = farpoint::test::allocations();
+  int pairs = 0;
+  for (const SceneFrame& frame : shown) pairs += initialiser->add(frame.frame) != nullptr ? 1 : 0;
+  initialiser->clear();
+  const std::uint64_t after = farpoint::test::allocations();
+  EXPECT_EQ(after - before, 0U);
+  EXPECT_GT(before, 0U);  // the count works
+  EXPECT_EQ(pairs, 2);
 }
 
 // The pixels of most frames go back to their pool: only a frame half way can be the next reference.

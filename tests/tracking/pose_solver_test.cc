@@ -17,7 +17,7 @@ namespace {
 struct PointOptions {
   double near_m = 4, far_m = 400;
   double noise_px = 0.5;
-  double relative_depth_sigma = 0.0;  // of the inverse depth: drawn with it and told to the solver
+  double relative_depth_sigma = 0.0;  // of the inverse depth: drawn with it, and given to the solver
 };
 
 // A body with two cameras among points anchored a little behind it.
@@ -193,7 +193,7 @@ TEST_F(PoseSolverTest, TooLittleIsNotOk) {
     EXPECT_FALSE(s.ok) << n;
     EXPECT_TRUE(s.T_world_body.is_finite());
   }
-  // Nothing but outliers.
+  // Outliers only.
   auto measurements = sightings(40, truth, {});
   spoil(1.0, &measurements);
   const PoseSolution s = solve_pose(rig, truth, measurements);
@@ -202,7 +202,7 @@ TEST_F(PoseSolverTest, TooLittleIsNotOk) {
 }
 
 TEST_F(PoseSolverTest, NeverGainsByDrivingPastThePoints) {
-  // From far behind the true pose the first step overshoots through the points. A pose that sees nothing
+  // From far behind the true pose the first step overshoots through the points. A pose that sees no point
   // leaves no residual; it must not win by that.
   for (int i = 0; i < 20; ++i) {
     const SE3 truth = random_pose();
@@ -325,7 +325,7 @@ TEST_F(PoseSolverTest, InBetweenItIsTheMeanWeightedByInformation) {
   }
 }
 
-// Far apart, so that one step does not do: the end is where images and prior pull alike.
+// Far apart: one step does not suffice. The optimum is where images and prior pull alike.
 TEST_F(PoseSolverTest, ImagesAndPriorBalanceWhereTheSolveEnds) {
   for (int i = 0; i < 20; ++i) {
     const SE3 truth = random_pose();
@@ -409,7 +409,7 @@ TEST_P(PoseCovarianceTest, IsRight) {
     sum.rotation += e.tail<3>().dot(s.covariance.bottomRightCorner<3, 3>().inverse() * e.tail<3>());
   }
   RecordProperty("nees", std::to_string(sum.nees / kTrials));
-  // The mean of so many has a standard deviation of sqrt(2 * 6 / 600) = 0.14 (three of freedom: 0.10).
+  // The mean of 600 has a standard deviation of sqrt(2 * 6 / 600) = 0.14 (three of freedom: 0.10).
   EXPECT_NEAR(sum.nees / kTrials, 6.0, 0.5);
   EXPECT_NEAR(sum.translation / kTrials, 3.0, 0.35);
   EXPECT_NEAR(sum.rotation / kTrials, 3.0, 0.35);
@@ -442,7 +442,7 @@ TEST_F(PoseSolverTest, WrongDepthsThatSayTheyAreUncertainDoNotBiasThePose) {
     const Vector6d e = truth.boxminus_to(s.T_world_body), e_naive = truth.boxminus_to(n.T_world_body);
     honest_rad += e.tail<3>().squaredNorm(), naive_rad += e_naive.tail<3>().squaredNorm();
     honest_m += e.head<3>().squaredNorm(), naive_m += e_naive.head<3>().squaredNorm();
-    // It knows the rotation by the far points and says that it knows.
+    // The far points give the rotation, and its reported sigma is small.
     EXPECT_LT(std::sqrt(s.covariance.diagonal().tail<3>().maxCoeff()), 1e-3);
     EXPECT_LT(e.tail<3>().norm(), 3e-3) << i;
   }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -137,6 +138,32 @@ TEST_F(TrackerTest, StartsFromTheMotionModelItIsGiven) {
   EXPECT_FALSE(tracker.track(*shown.frame).ok);
 }
 
+// As of wheels: they measure the way ahead. The prior is 4 mm off, less than the gate of any match.
+TEST_F(TrackerTest, APriorPullsThePoseByItsInformation) {
+  start();
+  track_and_accept(1);
+  const SE3 off = drive(2).boxplus((Vector6d() << 0.004, 0, 0, 0, 0, 0).finished());
+  FixedMotion model;
+  model.prior.T_world_body = off;
+  tracker.use_motion_model(&model);
+  const TrackOutcome by_images = track(2);
+  ASSERT_TRUE(by_images.ok);
+  EXPECT_LT(error_of(by_images.T_world_body, drive(2)), 2e-4);
+  // As certain as the images: half way.
+  model.prior.information = by_images.covariance.inverse();
+  const TrackOutcome half_way = tracker.track(*shown.frame);
+  ASSERT_TRUE(half_way.ok);
+  EXPECT_NEAR(by_images.T_world_body.boxminus_to(half_way.T_world_body)[0], 0.002, 2e-4);
+  EXPECT_LT(half_way.covariance(0, 0), 0.6 * by_images.covariance(0, 0));
+  // Far more certain along x, and only there.
+  model.prior.information.setZero();
+  model.prior.information(0, 0) = 1e4 / by_images.covariance(0, 0);
+  const TrackOutcome pulled = tracker.track(*shown.frame);
+  ASSERT_TRUE(pulled.ok);
+  EXPECT_NEAR(drive(2).boxminus_to(pulled.T_world_body)[0], 0.004, 1e-4);
+  EXPECT_LT(drive(2).boxminus_to(pulled.T_world_body).tail<3>().norm(), 1e-3);
+}
+
 // The turn of each frame is wider than the window around the last pose, not around the prior.
 TEST_F(TrackerTest, LooksWhereTheVelocityLeads) {
   scene.config.tracking.prior_search_px = 4;  // 16 px at most
@@ -266,6 +293,37 @@ TEST_F(TrackerTest, FollowsItsKeyframeIntoANewerView) {
   const TrackOutcome out = tracker.track(*shown.frame);
   ASSERT_TRUE(out.ok);
   EXPECT_LT(error_of(out.T_world_body, moved * drive(3)), 1e-3);
+}
+
+// Another unit and other axes between two frames. Without a lever arm: it would not change its length.
+TEST_F(TrackerTest, FollowsAMapThatIsDoubledAndTurnedBetweenTwoFrames) {
+  scene.rig.cameras[0].T_body_camera.t.setZero();
+  start();
+  for (const int n : {1, 2, 3}) track_and_accept(n);
+  const Vector6d velocity = tracker.velocity_body();
+  const Sim3 S{2.0, so3_exp({0.1, 0.2, 0.9}), {3, -2, 1}};
+  for (ScenePoint& p : scene.points) p.position_w = S * p.position_w;
+  scene.T_world_reference = S * scene.T_world_reference;
+  const auto view = scene.view();
+  view->reference_scale = 2.0;
+  view->keyframes = {{3, S * TrackingScene::pose({-2, 0, 0}), 2.0}, {7, scene.T_world_reference, 2.0}};
+  EXPECT_EQ(tracker.set_view(view), 2.0);
+  EXPECT_LT(error_of(tracker.T_world_body(), S * drive(3)), 2e-3);
+  EXPECT_LT((tracker.velocity_body().head<3>() - 2.0 * velocity.head<3>()).norm(), 1e-12);
+  // The prior hits: the first attempt finds the landmarks that the last frame saw, in the smallest window.
+  scene.add_doubles();
+  tracker.set_view(view);
+  for (const int n : {4, 5, 6}) {
+    shown = scene.look(S * drive(n), n * kFrame_us);
+    const TrackOutcome out = tracker.track(*shown.frame);
+    ASSERT_TRUE(out.ok) << n;
+    EXPECT_LT(error_of(out.T_world_body, S * drive(n)), 2e-3) << n;
+    EXPECT_GT(out.inliers, 150) << n;
+    tracker.accept(*shown.frame, out);
+  }
+  const Vector6d expected = drive(5).boxminus_to(drive(6)) * 10.0;
+  EXPECT_LT((tracker.velocity_body().head<3>() - 2.0 * expected.head<3>()).norm(), 0.04);
+  EXPECT_LT((tracker.velocity_body().tail<3>() - expected.tail<3>()).norm(), 0.02);
 }
 
 TEST_F(TrackerTest, PosesFramesOfAnotherTrackerWithoutMovingItself) {

@@ -147,7 +147,8 @@ TEST_F(TwoCameraTracking, AMapStartsFromTheImagesOfEitherCamera) {
     std::optional<InitialPair> pair;
     for (int n = 0; n < 20 && !pair; ++n) {
       const SE3 pose = TrackingScene::pose({0.05 * n, 0.25 * n, 0.0}, {0, 0, 0.01 * n});
-      pair = initialiser.add(scene.look(pose, n * kFrame_us, camera).frame);
+      if (const InitialPair* found = initialiser.add(scene.look(pose, n * kFrame_us, camera).frame))
+        pair = *found;
     }
     ASSERT_TRUE(pair.has_value()) << camera;
     EXPECT_EQ(pair->camera, camera);

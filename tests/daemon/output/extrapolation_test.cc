@@ -28,6 +28,14 @@ TEST(Extrapolation, StraightOn) {
   EXPECT_EQ(f.age_us, 70'000);
 }
 
+TEST(Extrapolation, MovesTheMapsPoseInTheMapsUnit) {
+  FrameOutput frame = moving({10, 0, 0}, {0, 0, 0});
+  frame.result.map_from_odom.scale = 2.0;
+  const FrameOutput f = extrapolate(frame, 0.05);
+  EXPECT_NEAR(f.result.T_odom_body.t.x(), 1.5, 1e-12);
+  EXPECT_NEAR(f.result.T_map_body.t.x(), 0.0, 1e-12);
+}
+
 // A quarter of a circle of radius 10 m: exact way against the half-turn rule, in steps as they are used.
 TEST(Extrapolation, FollowsACircle) {
   constexpr double kRadius_m = 10.0, kTurn_rad_s = 0.5, kStep_s = 0.02;

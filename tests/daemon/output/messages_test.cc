@@ -102,7 +102,7 @@ TEST(Messages, ValidFrame) {
   EXPECT_EQ(m.scale, 1.5);
   EXPECT_EQ(m.position[1], 8.0);
   const bot_core::pose_t b = make_bot_core_pose(f);
-  const Eigen::Vector3d velocity_map = f.result.T_map_body.q * f.result.velocity_body.head<3>();
+  const Eigen::Vector3d velocity_map = f.result.T_map_body.q * (1.5 * f.result.velocity_body.head<3>());
   EXPECT_DOUBLE_EQ(b.vel[0], velocity_map.x());
 }
 
