@@ -256,7 +256,8 @@ bool LogSource::take_ground_truth(const ipc::LogEvent& event, LogItem* item) {
 ipc::ImageStatus LogSource::decode(const LogItem& item, ipc::GreyImage* image) {
   const ipc::ImageStatus status = decoder_.decode(*item.image, image);
   if (status == ipc::ImageStatus::kWrongSize) ++counts_.images_wrong_size;
-  if (status == ipc::ImageStatus::kDamaged || status == ipc::ImageStatus::kUnknownFormat)
+  if (status == ipc::ImageStatus::kDamaged || status == ipc::ImageStatus::kUnknownFormat ||
+      status == ipc::ImageStatus::kTooLarge)
     ++counts_.images_undecodable;
   return status;
 }

@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <random>
 #include <string>
 
 #include <png.h>
+#include <zlib.h>
 
 #include "tests/ipc/jpeg_images.h"
 
@@ -173,6 +175,106 @@ TEST(ImageCodec, ProbeTellsSizeAndKind) {
   EXPECT_EQ(png->height_px, 30);
   EXPECT_FALSE(probe_image({}));
   EXPECT_FALSE(probe_image(grey));
+}
+
+// Bytes of zeros, compressed.
+Bytes deflated_zeros(std::size_t bytes) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit(&stream, Z_BEST_COMPRESSION), Z_OK);
+  const Bytes zeros(std::size_t{1} << 20, 0);
+  Bytes out;
+  std::array<std::uint8_t, 65536> piece{};
+  for (std::size_t left = bytes; left > 0 || stream.avail_out == 0;) {
+    const std::size_t now = std::min(left, zeros.size());
+    left -= now;
+    stream.next_in = const_cast<Bytef*>(zeros.data());
+    stream.avail_in = static_cast<uInt>(now);
+    do {
+      stream.next_out = piece.data();
+      stream.avail_out = static_cast<uInt>(piece.size());
+      deflate(&stream, left == 0 ? Z_FINISH : Z_NO_FLUSH);
+      out.insert(out.end(), piece.data(), stream.next_out);
+    } while (stream.avail_out == 0);
+  }
+  deflateEnd(&stream);
+  return out;
+}
+
+// Puts a chunk behind the header of a PNG file.
+void put_chunk(const std::string& name, const Bytes& content, Bytes* png) {
+  constexpr std::size_t kBehindHeader = 8 + 25;  // signature, IHDR
+  const auto put_32 = [](std::uint32_t value, Bytes* out) {
+    for (int shift = 24; shift >= 0; shift -= 8) out->push_back(static_cast<std::uint8_t>(value >> shift));
+  };
+  Bytes chunk;
+  put_32(static_cast<std::uint32_t>(content.size()), &chunk);
+  chunk.insert(chunk.end(), name.begin(), name.end());
+  chunk.insert(chunk.end(), content.begin(), content.end());
+  put_32(static_cast<std::uint32_t>(crc32(0, chunk.data() + 4, static_cast<uInt>(chunk.size() - 4))), &chunk);
+  png->insert(png->begin() + kBehindHeader, chunk.begin(), chunk.end());
+}
+
+TEST(ImageCodec, TextOfAPngTakesNoMemory) {
+  // 8 MB of zeros in each chunk, a few kB compressed.
+  const Bytes zeros = deflated_zeros(std::size_t{8} << 20);
+  Bytes text = {'x', 0, 0}, international = {'x', 0, 1, 0, 0, 0}, profile = {'x', 0, 0};
+  for (Bytes* content : {&text, &international, &profile})
+    content->insert(content->end(), zeros.begin(), zeros.end());
+  const Bytes grey = picture(40, 30, 1);
+  for (const auto& [name, content] :
+       {std::pair{"zTXt", text}, std::pair{"iTXt", international}, std::pair{"iCCP", profile}}) {
+    Bytes png = to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE);
+    for (int i = 0; i < 20; ++i) put_chunk(name, content, &png);
+    ImageDecoder decoder;
+    GreyImage image;
+    ASSERT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 30, png), &image), ImageStatus::kOk)
+        << name;
+    EXPECT_EQ(image.pixels, grey) << name;
+    EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes) << name;
+  }
+}
+
+TEST(ImageCodec, AJpegThatNeedsMoreMemoryThanItsSizeAllowsIsRefusedAndTheNextOneDecoded) {
+  const Bytes grey = picture(4096, 16, 1);
+  ImageDecoder decoder;
+  GreyImage image;
+  const Bytes jpeg = to_jpeg(grey, 4096, 16, 1, true);
+  ASSERT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 4096, 16, jpeg), &image), ImageStatus::kOk);
+  // Sampling factors that blow its second component up: one 16th of the first's blocks would be needed.
+  Bytes rgb;
+  for (int i = 0; i < 4096 * 16; ++i) rgb.insert(rgb.end(), {10, 200, 30});
+  Bytes colour = to_jpeg(rgb, 4096, 16, 3, true);
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 4096, 16, colour), &image), ImageStatus::kOk);
+  EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes);
+}
+
+TEST(ImageCodec, MorePixelsThanTheLimitAreRefused) {
+  const Bytes grey = picture(40, 30, 1);
+  for (const auto& [format, data] :
+       {std::pair{image_t::PIXEL_FORMAT_GREY, grey},
+        std::pair{image_t::PIXEL_FORMAT_MJPEG, to_jpeg(grey, 40, 30, 1)},
+        std::pair{image_t::PIXEL_FORMAT_PNG,
+                  to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE)}}) {
+    GreyImage image;
+    EXPECT_EQ(ImageDecoder(1200).decode(message(format, 40, 30, data), &image), ImageStatus::kOk);
+    EXPECT_EQ(ImageDecoder(1199).decode(message(format, 40, 30, data), &image), ImageStatus::kTooLarge);
+  }
+}
+
+TEST(DecodeArena, AllocatesUpToItsLimitAndStartsAnewAfterIt) {
+  DecodeArena arena;
+  arena.reset(std::size_t{3} << 20);
+  EXPECT_NE(arena.allocate(1000), nullptr);
+  EXPECT_NE(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_FALSE(arena.has_refused());
+  EXPECT_EQ(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_TRUE(arena.has_refused());
+  EXPECT_LE(arena.bytes(), std::size_t{3} << 20);
+  arena.reset();
+  EXPECT_FALSE(arena.has_refused());
+  EXPECT_EQ(arena.bytes(), std::size_t{1} << 20) << "blocks of another image's sizes are not in the way";
+  EXPECT_NE(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_EQ(arena.allocate(SIZE_MAX), nullptr);
 }
 
 class DamagedImage : public testing::TestWithParam<bool> {
