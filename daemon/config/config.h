@@ -119,6 +119,7 @@ struct RealtimeConfig {
 };
 
 struct Config {
+  int image_mb = 160;  // capacity.image_mb: of the images in memory; a larger image is refused
   LogConfig log;
   ControlConfig control;
   StateConfig state;

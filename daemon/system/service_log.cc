@@ -12,6 +12,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "ipc/printable.h"
+
 namespace farpoint::daemon {
 namespace {
 
@@ -106,6 +108,15 @@ void stop_service_log() {
   spdlog::shutdown();
 }
 
+void hand_on_one_line(const spdlog::details::log_msg& message, spdlog::sinks::sink* sink) {
+  const std::string_view text(message.payload.data(), message.payload.size());
+  if (ipc::is_printable_line(text)) return sink->log(message);
+  const std::string line = ipc::printable(text);
+  spdlog::details::log_msg plain = message;
+  plain.payload = line;
+  sink->log(plain);
+}
+
 void RateLimitedSink::sink_it_(const spdlog::details::log_msg& message) {
   if (!may_pass(message)) {
     ++left_out_;
@@ -130,7 +141,7 @@ bool RateLimitedSink::may_pass(const spdlog::details::log_msg& message) {
 }
 
 void RateLimitedSink::hand_on(const spdlog::details::log_msg& message) {
-  for (const spdlog::sink_ptr& sink : sinks_) sink->log(message);
+  for (const spdlog::sink_ptr& sink : sinks_) hand_on_one_line(message, sink.get());
 }
 
 void RateLimitedSink::flush_() {
