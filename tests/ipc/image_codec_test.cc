@@ -3,21 +3,22 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <random>
 #include <string>
 
-#include <png.h>
-#include <zlib.h>
-
 #include "tests/ipc/jpeg_images.h"
+#include "tests/ipc/png_images.h"
 
 namespace farpoint::ipc {
 namespace {
 
+using test::deflated_zeros;
+using test::PngKind;
+using test::put_png_chunk;
 using test::to_jpeg;
+using test::to_png;
 using Bytes = std::vector<std::uint8_t>;
 
 // A smooth picture: JPEG keeps it within a few grey levels.
@@ -30,31 +31,6 @@ Bytes picture(int width_px, int height_px, int channels) {
       }
     }
   }
-  return out;
-}
-
-Bytes to_png(const Bytes& pixels, int width_px, int height_px, int type, int depth, int interlace) {
-  Bytes out;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  png_set_write_fn(
-      png, &out,
-      [](png_structp p, png_bytep data, std::size_t size) {
-        auto* bytes = static_cast<Bytes*>(png_get_io_ptr(p));
-        bytes->insert(bytes->end(), data, data + size);
-      },
-      nullptr);
-  png_set_IHDR(png, info, png_uint_32(width_px), png_uint_32(height_px), depth, type, interlace,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_write_info(png, info);
-  const std::size_t row_bytes = png_get_rowbytes(png, info);
-  std::vector<png_bytep> rows;
-  for (int v = 0; v < height_px; ++v) {
-    rows.push_back(const_cast<png_bytep>(pixels.data()) + static_cast<std::size_t>(v) * row_bytes);
-  }
-  png_write_image(png, rows.data());
-  png_write_end(png, nullptr);
-  png_destroy_write_struct(&png, &info);
   return out;
 }
 
@@ -137,15 +113,18 @@ TEST(ImageCodec, PngOfEveryKind) {
     rgba.insert(rgba.end(), {value, value, value, 200});
     grey16.insert(grey16.end(), {value, value});
   }
-  for (const int interlace : {PNG_INTERLACE_NONE, PNG_INTERLACE_ADAM7}) {
-    for (const auto& [pixels, type, depth] :
-         {std::tuple{grey, PNG_COLOR_TYPE_GRAY, 8}, std::tuple{rgb, PNG_COLOR_TYPE_RGB, 8},
-          std::tuple{rgba, PNG_COLOR_TYPE_RGB_ALPHA, 8}, std::tuple{grey16, PNG_COLOR_TYPE_GRAY, 16}}) {
-      const image_t in = message(image_t::PIXEL_FORMAT_PNG, width_px, height_px,
-                                 to_png(pixels, width_px, height_px, type, depth, interlace));
-      ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk) << type << " " << depth;
-      EXPECT_LE(largest_difference(image.pixels, grey), 1) << type << " " << depth;
-    }
+  for (const auto& [pixels, kind] : {std::pair{grey, PngKind::kGrey},
+                                     {grey, PngKind::kGreyInterlaced},
+                                     {rgb, PngKind::kRgb},
+                                     {rgb, PngKind::kRgbInterlaced},
+                                     {rgba, PngKind::kRgba},
+                                     {rgba, PngKind::kRgbaInterlaced},
+                                     {grey16, PngKind::kGrey16},
+                                     {grey16, PngKind::kGrey16Interlaced}}) {
+    const image_t in =
+        message(image_t::PIXEL_FORMAT_PNG, width_px, height_px, to_png(pixels, width_px, height_px, kind));
+    ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk) << static_cast<int>(kind);
+    EXPECT_LE(largest_difference(image.pixels, grey), 1) << static_cast<int>(kind);
   }
 }
 
@@ -155,8 +134,7 @@ TEST(ImageCodec, AnotherSizeThanTheMessageSaysIsRefused) {
   const Bytes grey = picture(40, 30, 1);
   EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 41, 30, to_jpeg(grey, 40, 30, 1)), &image),
             ImageStatus::kWrongSize);
-  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 31,
-                                   to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE)),
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 31, to_png(grey, 40, 30, PngKind::kGrey)),
                            &image),
             ImageStatus::kWrongSize);
 }
@@ -168,50 +146,13 @@ TEST(ImageCodec, ProbeTellsSizeAndKind) {
   EXPECT_EQ(jpeg->pixel_format, +image_t::PIXEL_FORMAT_MJPEG);
   EXPECT_EQ(jpeg->width_px, 40);
   EXPECT_EQ(jpeg->height_px, 30);
-  const auto png = probe_image(to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+  const auto png = probe_image(to_png(grey, 40, 30, PngKind::kGrey));
   ASSERT_TRUE(png);
   EXPECT_EQ(png->pixel_format, +image_t::PIXEL_FORMAT_PNG);
   EXPECT_EQ(png->width_px, 40);
   EXPECT_EQ(png->height_px, 30);
   EXPECT_FALSE(probe_image({}));
   EXPECT_FALSE(probe_image(grey));
-}
-
-// Bytes of zeros, compressed.
-Bytes deflated_zeros(std::size_t bytes) {
-  z_stream stream{};
-  EXPECT_EQ(deflateInit(&stream, Z_BEST_COMPRESSION), Z_OK);
-  const Bytes zeros(std::size_t{1} << 20, 0);
-  Bytes out;
-  std::array<std::uint8_t, 65536> piece{};
-  for (std::size_t left = bytes; left > 0 || stream.avail_out == 0;) {
-    const std::size_t now = std::min(left, zeros.size());
-    left -= now;
-    stream.next_in = const_cast<Bytef*>(zeros.data());
-    stream.avail_in = static_cast<uInt>(now);
-    do {
-      stream.next_out = piece.data();
-      stream.avail_out = static_cast<uInt>(piece.size());
-      deflate(&stream, left == 0 ? Z_FINISH : Z_NO_FLUSH);
-      out.insert(out.end(), piece.data(), stream.next_out);
-    } while (stream.avail_out == 0);
-  }
-  deflateEnd(&stream);
-  return out;
-}
-
-// Puts a chunk behind the header of a PNG file.
-void put_chunk(const std::string& name, const Bytes& content, Bytes* png) {
-  constexpr std::size_t kBehindHeader = 8 + 25;  // signature, IHDR
-  const auto put_32 = [](std::uint32_t value, Bytes* out) {
-    for (int shift = 24; shift >= 0; shift -= 8) out->push_back(static_cast<std::uint8_t>(value >> shift));
-  };
-  Bytes chunk;
-  put_32(static_cast<std::uint32_t>(content.size()), &chunk);
-  chunk.insert(chunk.end(), name.begin(), name.end());
-  chunk.insert(chunk.end(), content.begin(), content.end());
-  put_32(static_cast<std::uint32_t>(crc32(0, chunk.data() + 4, static_cast<uInt>(chunk.size() - 4))), &chunk);
-  png->insert(png->begin() + kBehindHeader, chunk.begin(), chunk.end());
 }
 
 TEST(ImageCodec, TextOfAPngTakesNoMemory) {
@@ -223,8 +164,8 @@ TEST(ImageCodec, TextOfAPngTakesNoMemory) {
   const Bytes grey = picture(40, 30, 1);
   for (const auto& [name, content] :
        {std::pair{"zTXt", text}, std::pair{"iTXt", international}, std::pair{"iCCP", profile}}) {
-    Bytes png = to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE);
-    for (int i = 0; i < 20; ++i) put_chunk(name, content, &png);
+    Bytes png = to_png(grey, 40, 30, PngKind::kGrey);
+    for (int i = 0; i < 20; ++i) put_png_chunk(name, content, &png);
     ImageDecoder decoder;
     GreyImage image;
     ASSERT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 30, png), &image), ImageStatus::kOk)
@@ -234,18 +175,16 @@ TEST(ImageCodec, TextOfAPngTakesNoMemory) {
   }
 }
 
-TEST(ImageCodec, AJpegThatNeedsMoreMemoryThanItsSizeAllowsIsRefusedAndTheNextOneDecoded) {
-  const Bytes grey = picture(4096, 16, 1);
-  ImageDecoder decoder;
-  GreyImage image;
-  const Bytes jpeg = to_jpeg(grey, 4096, 16, 1, true);
-  ASSERT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 4096, 16, jpeg), &image), ImageStatus::kOk);
-  // Sampling factors that blow its second component up: one 16th of the first's blocks would be needed.
-  Bytes rgb;
-  for (int i = 0; i < 4096 * 16; ++i) rgb.insert(rgb.end(), {10, 200, 30});
-  Bytes colour = to_jpeg(rgb, 4096, 16, 3, true);
-  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 4096, 16, colour), &image), ImageStatus::kOk);
-  EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes);
+TEST(ImageCodec, AProgressiveJpegOfAnyShapeIsDecodedWithinTheLimit) {
+  for (const auto& [width_px, height_px] : {std::pair{4096, 16}, {16, 4096}, {16384, 1}, {1, 16384}}) {
+    Bytes rgb(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px) * 3, 77);
+    const Bytes jpeg = to_jpeg(rgb, width_px, height_px, 3, true);
+    ImageDecoder decoder;
+    GreyImage image;
+    EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, width_px, height_px, jpeg), &image),
+              ImageStatus::kOk);
+    EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes);
+  }
 }
 
 TEST(ImageCodec, MorePixelsThanTheLimitAreRefused) {
@@ -253,8 +192,7 @@ TEST(ImageCodec, MorePixelsThanTheLimitAreRefused) {
   for (const auto& [format, data] :
        {std::pair{image_t::PIXEL_FORMAT_GREY, grey},
         std::pair{image_t::PIXEL_FORMAT_MJPEG, to_jpeg(grey, 40, 30, 1)},
-        std::pair{image_t::PIXEL_FORMAT_PNG,
-                  to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE)}}) {
+        std::pair{image_t::PIXEL_FORMAT_PNG, to_png(grey, 40, 30, PngKind::kGrey)}}) {
     GreyImage image;
     EXPECT_EQ(ImageDecoder(1200).decode(message(format, 40, 30, data), &image), ImageStatus::kOk);
     EXPECT_EQ(ImageDecoder(1199).decode(message(format, 40, 30, data), &image), ImageStatus::kTooLarge);
@@ -282,8 +220,7 @@ class DamagedImage : public testing::TestWithParam<bool> {
   [[nodiscard]] image_t intact() const {
     const Bytes grey = picture(64, 48, 1);
     return GetParam() ? message(image_t::PIXEL_FORMAT_MJPEG, 64, 48, to_jpeg(grey, 64, 48, 1))
-                      : message(image_t::PIXEL_FORMAT_PNG, 64, 48,
-                                to_png(grey, 64, 48, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+                      : message(image_t::PIXEL_FORMAT_PNG, 64, 48, to_png(grey, 64, 48, PngKind::kGrey));
   }
 };
 
