@@ -13,7 +13,7 @@ namespace {
 
 drivers::LogSource open_source(const std::string& path, const Config& config) {
   try {
-    return {path, most_image_pixels(config), config.camera.index};
+    return drivers::LogSource(path, most_image_pixels(config), config.camera.index);
   } catch (const std::runtime_error& error) {
     const std::string what = error.what();
     const bool says = what.find("expected") != std::string::npos;
