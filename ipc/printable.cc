@@ -61,13 +61,14 @@ bool is_printable_line(std::string_view text) {
 
 std::string printable(std::string_view text, std::size_t most_bytes) {
   std::string line;
+  std::size_t cut_at = 0;  // the most that leaves room for kCut
   while (!text.empty()) {
     const std::size_t bytes = printable_character(text);
     const std::string piece = bytes > 0 ? std::string(text.substr(0, bytes)) : escaped_byte(byte_of(text, 0));
     text.remove_prefix(bytes > 0 ? bytes : 1);
-    const std::size_t room = most_bytes - (text.empty() ? 0 : kCut.size());
-    if (line.size() + piece.size() > room) return line.append(kCut);
+    if (line.size() + piece.size() > most_bytes) return line.substr(0, cut_at).append(kCut);
     line += piece;
+    if (line.size() + kCut.size() <= most_bytes) cut_at = line.size();
   }
   return line;
 }

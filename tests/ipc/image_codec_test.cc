@@ -162,8 +162,8 @@ TEST(ImageCodec, TextOfAPngTakesNoMemory) {
   for (Bytes* content : {&text, &international, &profile})
     content->insert(content->end(), zeros.begin(), zeros.end());
   const Bytes grey = picture(40, 30, 1);
-  for (const auto& [name, content] :
-       {std::pair{"zTXt", text}, std::pair{"iTXt", international}, std::pair{"iCCP", profile}}) {
+  const std::pair<std::string, Bytes> chunks[] = {{"zTXt", text}, {"iTXt", international}, {"iCCP", profile}};
+  for (const auto& [name, content] : chunks) {
     Bytes png = to_png(grey, 40, 30, PngKind::kGrey);
     for (int i = 0; i < 20; ++i) put_png_chunk(name, content, &png);
     ImageDecoder decoder;
@@ -189,10 +189,11 @@ TEST(ImageCodec, AProgressiveJpegOfAnyShapeIsDecodedWithinTheLimit) {
 
 TEST(ImageCodec, MorePixelsThanTheLimitAreRefused) {
   const Bytes grey = picture(40, 30, 1);
-  for (const auto& [format, data] :
-       {std::pair{image_t::PIXEL_FORMAT_GREY, grey},
-        std::pair{image_t::PIXEL_FORMAT_MJPEG, to_jpeg(grey, 40, 30, 1)},
-        std::pair{image_t::PIXEL_FORMAT_PNG, to_png(grey, 40, 30, PngKind::kGrey)}}) {
+  const std::pair<std::int32_t, Bytes> images[] = {
+      {image_t::PIXEL_FORMAT_GREY, grey},
+      {image_t::PIXEL_FORMAT_MJPEG, to_jpeg(grey, 40, 30, 1)},
+      {image_t::PIXEL_FORMAT_PNG, to_png(grey, 40, 30, PngKind::kGrey)}};
+  for (const auto& [format, data] : images) {
     GreyImage image;
     EXPECT_EQ(ImageDecoder(1200).decode(message(format, 40, 30, data), &image), ImageStatus::kOk);
     EXPECT_EQ(ImageDecoder(1199).decode(message(format, 40, 30, data), &image), ImageStatus::kTooLarge);
