@@ -31,6 +31,13 @@ bool is_possible_size(std::int64_t width_px, std::int64_t height_px) {
   return width_px > 0 && height_px > 0 && width_px <= kMaxImageSide_px && height_px <= kMaxImageSide_px;
 }
 
+// Empty where an image of this size is decoded.
+std::optional<ImageStatus> refuse_size(int width_px, int height_px, std::int64_t most_pixels) {
+  if (!is_possible_size(width_px, height_px)) return ImageStatus::kWrongSize;
+  if (std::int64_t{width_px} * height_px > most_pixels) return ImageStatus::kTooLarge;
+  return std::nullopt;
+}
+
 void set_size(GreyImage* image, int width_px, int height_px) {
   image->width_px = width_px;
   image->height_px = height_px;
@@ -331,10 +338,12 @@ ImageDecoder::ImageDecoder(std::int64_t most_pixels)
 ImageDecoder::~ImageDecoder() = default;
 
 ImageStatus ImageDecoder::decode_jpeg(Bytes file, int width_px, int height_px, GreyImage* image) {
+  if (const auto refused = refuse_size(width_px, height_px, most_pixels_)) return *refused;
   return file.empty() ? ImageStatus::kDamaged : jpeg_->decode(file, width_px, height_px, image);
 }
 
 ImageStatus ImageDecoder::decode(const image_t& message, GreyImage* image) {
+  if (const auto refused = refuse_size(message.width, message.height, most_pixels_)) return *refused;
   switch (message.pixel_format) {
     case image_t::PIXEL_FORMAT_GREY:
       return copy_grey(message, image);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 
 #include <png.h>
 #include <zlib.h>
@@ -39,8 +40,10 @@ bool is_interlaced(PngKind kind) {
          kind == PngKind::kRgbaInterlaced || kind == PngKind::kGrey16Interlaced;
 }
 
-void put_32(std::uint32_t value, Bytes* out) {
-  for (int shift = 24; shift >= 0; shift -= 8) out->push_back(static_cast<std::uint8_t>(value >> shift));
+std::string big_endian_32(std::uint64_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xff);
+  return bytes;
 }
 
 }  // namespace
@@ -74,13 +77,15 @@ std::vector<std::uint8_t> to_png(std::span<const std::uint8_t> pixels, int width
 
 void put_png_chunk(const std::string& name, const std::vector<std::uint8_t>& content,
                    std::vector<std::uint8_t>* png) {
-  constexpr std::ptrdiff_t kBehindHeader = 8 + 25;  // signature, IHDR
-  Bytes chunk;
-  put_32(static_cast<std::uint32_t>(content.size()), &chunk);
-  chunk.insert(chunk.end(), name.begin(), name.end());
-  chunk.insert(chunk.end(), content.begin(), content.end());
-  put_32(static_cast<std::uint32_t>(crc32(0, chunk.data() + 4, static_cast<uInt>(chunk.size() - 4))), &chunk);
-  png->insert(png->begin() + kBehindHeader, chunk.begin(), chunk.end());
+  constexpr std::size_t kHeadBytes = 8 + 25;  // signature, IHDR
+  Bytes out(png->begin(), png->begin() + kHeadBytes);
+  const auto put = [&out](std::string_view bytes) { out.insert(out.end(), bytes.begin(), bytes.end()); };
+  const std::string named = name + std::string(content.begin(), content.end());
+  put(big_endian_32(content.size()));
+  put(named);
+  put(big_endian_32(crc32(0, reinterpret_cast<const Bytef*>(named.data()), static_cast<uInt>(named.size()))));
+  out.insert(out.end(), png->begin() + kHeadBytes, png->end());
+  png->swap(out);
 }
 
 std::vector<std::uint8_t> deflated_zeros(std::size_t bytes) {
