@@ -11,10 +11,11 @@ list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/daemon/system/control_socket.cc ${CMAKE_S
      ${CMAKE_SOURCE_DIR}/tools/simulate/world/world_file.cc ${CMAKE_SOURCE_DIR}/tools/simulate/world/yaml_section.cc
      ${CMAKE_SOURCE_DIR}/tests/ipc/jpeg_images.cc ${CMAKE_SOURCE_DIR}/tests/ipc/png_images.cc
      ${CMAKE_SOURCE_DIR}/tests/daemon/synthetic_log.cc)
-file(GLOB_RECURSE beside CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/slam/geometry/*.cc ${CMAKE_SOURCE_DIR}/tools/simulate/world/*.cc
+file(GLOB_RECURSE beside CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tools/simulate/world/*.cc
      ${CMAKE_SOURCE_DIR}/tools/simulate/render/*.cc ${CMAKE_SOURCE_DIR}/tools/simulate/sensors/*.cc)
 list(REMOVE_ITEM beside ${fuzzed})
-list(APPEND beside ${CMAKE_SOURCE_DIR}/tools/simulate/simulation.cc)
+list(APPEND beside ${CMAKE_SOURCE_DIR}/tools/simulate/simulation.cc ${CMAKE_SOURCE_DIR}/slam/geometry/camera.cc
+     ${CMAKE_SOURCE_DIR}/slam/geometry/se3.cc)
 
 set(fuzz_checks address,undefined,float-cast-overflow)
 add_library(farpoint_fuzz_base INTERFACE)
