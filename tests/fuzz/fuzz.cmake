@@ -15,7 +15,7 @@ file(GLOB_RECURSE beside CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tools/simulate/wo
      ${CMAKE_SOURCE_DIR}/tools/simulate/render/*.cc ${CMAKE_SOURCE_DIR}/tools/simulate/sensors/*.cc)
 list(REMOVE_ITEM beside ${fuzzed})
 list(APPEND beside ${CMAKE_SOURCE_DIR}/tools/simulate/simulation.cc ${CMAKE_SOURCE_DIR}/slam/geometry/camera.cc
-     ${CMAKE_SOURCE_DIR}/slam/geometry/se3.cc)
+     ${CMAKE_SOURCE_DIR}/slam/geometry/se3.cc ${CMAKE_SOURCE_DIR}/slam/frame_result.cc)
 
 set(fuzz_checks address,undefined,float-cast-overflow)
 add_library(farpoint_fuzz_base INTERFACE)

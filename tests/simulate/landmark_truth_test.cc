@@ -179,7 +179,7 @@ TEST_F(LandmarkTruth, AMessageOfAnImpossibleSimulationIsRefused) {
       EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
     }
   };
-  for (const double duration : {NAN, -1.0, 0.0, 1e300})
+  for (const double duration : {std::nan(""), -1.0, 0.0, 1e300})
     expect_refused([duration](simulation_t* m) { m->duration = duration; }, "SIMULATION: duration");
   for (const int side : {0, -94, 31, 4097, INT32_MAX}) {
     expect_refused([side](simulation_t* m) { m->width = side; }, "SIMULATION: images of");
