@@ -34,9 +34,12 @@ image_t message_of(ByteView input) {
   return message;
 }
 
-Bytes input_of(std::size_t format, const Bytes& file) {
-  Bytes input = {static_cast<std::uint8_t>(format), 0, 0, 0, 0};
-  input.insert(input.end(), file.begin(), file.end());
+Bytes input_of(std::size_t format, const Bytes& file, int width_px = 0, int height_px = 0) {
+  Bytes input(kHeadBytes + file.size());
+  input[0] = static_cast<std::uint8_t>(format);
+  input[2] = static_cast<std::uint8_t>(width_px);
+  input[4] = static_cast<std::uint8_t>(height_px);
+  std::copy(file.begin(), file.end(), input.begin() + kHeadBytes);
   return input;
 }
 
@@ -87,9 +90,7 @@ std::vector<Bytes> seeds_of_image() {
   for (const std::uint8_t value : grey)
     rgb.insert(rgb.end(), {value, static_cast<std::uint8_t>(255 - value), 7});
   std::vector<Bytes> seeds;
-  Bytes raw = {0, 0, kSmallWidth_px, 0, kSmallHeight_px};
-  raw.insert(raw.end(), grey.begin(), grey.end());
-  seeds.push_back(raw);
+  seeds.push_back(input_of(0, grey, kSmallWidth_px, kSmallHeight_px));
   for (const bool progressive : {false, true}) {
     seeds.push_back(input_of(1, test::to_jpeg(grey, kSmallWidth_px, kSmallHeight_px, 1, progressive)));
     seeds.push_back(input_of(1, test::to_jpeg(rgb, kSmallWidth_px, kSmallHeight_px, 3, progressive)));
