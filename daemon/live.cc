@@ -10,6 +10,7 @@
 
 #include "daemon/config/build_info.h"
 #include "daemon/config/camera_file.h"
+#include "daemon/config/rig.h"
 #include "daemon/input/camera_driver.h"
 #include "daemon/input/camera_source.h"
 #include "daemon/input/recorder.h"
@@ -59,8 +60,11 @@ calibration_t read_calibration(const Config& config) {
     throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
                       ", expected 0 for a live camera");
   const CameraConfig& camera = config.camera;
-  if (camera.has_second()) return read_stereo_calibration(camera.calibration, camera.second_calibration);
-  return calibration_of(read_camera_file(camera.calibration), "camera");
+  calibration_t calibration = camera.has_second()
+                                  ? read_stereo_calibration(camera.calibration, camera.second_calibration)
+                                  : calibration_of(read_camera_file(camera.calibration), "camera");
+  check_image_size(calibration, config);
+  return calibration;
 }
 
 void say(const drivers::CameraEvent& event, const std::string& device) {

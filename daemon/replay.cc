@@ -72,7 +72,7 @@ int conclude(const Options& options, const LogFrameSource& source, std::int64_t 
 // One thread: lockstep, or in the order of `schedule`.
 int replay_in_order(const Options& options, const Config& config, Schedule* schedule) {
   const StopOnSignal stop;
-  LogFrameSource source(options.replay, config.camera.index);
+  LogFrameSource source(options.replay, config);
   Outputs outputs(options, config, schedule != nullptr ? schedule->boot_counter() : 0);
   std::unique_ptr<Session> session;
   std::optional<MeasurementFeed> feed;
@@ -106,7 +106,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
 
 int replay_with_threads(const Options& options, const Config& config, const ThreadHooks& hooks) {
   const StopOnSignal stop;
-  LogFrameSource source(options.replay, config.camera.index);
+  LogFrameSource source(options.replay, config);
   Outputs outputs(options, config);
   // The first image brings the calibration, and with it what everything is sized from.
   StageClock clock;

@@ -16,6 +16,7 @@
 #include "daemon/system/logging.h"
 #include "daemon/system/service_log.h"
 #include "daemon/system/solver_loader.h"
+#include "ipc/printable.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -57,7 +58,7 @@ struct ServiceLogEnd {
 };
 
 int fail(const char* what, int status) {
-  std::fprintf(stderr, "farpointd: %s\n", what);
+  std::fprintf(stderr, "farpointd: %s\n", ipc::printable(what).c_str());
   return status;
 }
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -176,9 +177,22 @@ bool DbcSignal::put(double physical, CanFrame* frame) const {
 }
 
 DbcSignal read_dbc_signal(const std::string& path, const std::string& message, const std::string& signal) {
-  std::ifstream file(path);
+  std::ifstream file(path, std::ios::binary);
   if (!file)
     throw std::runtime_error(path + ": cannot be opened (" + std::strerror(errno) + "), expected a DBC file");
+  std::string text;
+  for (std::array<char, 65536> piece; text.size() <= kMaxDbcBytes && file;) {
+    file.read(piece.data(), piece.size());
+    text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  if (text.size() > kMaxDbcBytes)
+    throw std::runtime_error(path + ": longer than 16 MiB, expected a DBC file");
+  return parse_dbc_signal(text, path, message, signal);
+}
+
+DbcSignal parse_dbc_signal(const std::string& text, const std::string& path, const std::string& message,
+                           const std::string& signal) {
+  std::istringstream file(text);
   DbcSignal found;
   bool in_message = false, message_seen = false;
   int number = 0;

@@ -3,6 +3,7 @@
 // into it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -29,9 +30,15 @@ struct DbcSignal {
   [[nodiscard]] bool put(double physical, CanFrame* frame) const;
 };
 
+inline constexpr std::size_t kMaxDbcBytes = std::size_t{16} << 20;
+
 // Reads one signal's description. Throws std::runtime_error with the file, the line where known, and what was
-// expected. Multiplexed signals and extended identifiers are not supported.
+// expected; also for a file longer than kMaxDbcBytes. Multiplexed signals and extended identifiers are not
+// supported.
 [[nodiscard]] DbcSignal read_dbc_signal(const std::string& path, const std::string& message,
                                         const std::string& signal);
+// Reads a file's text; `path` names it in errors.
+[[nodiscard]] DbcSignal parse_dbc_signal(const std::string& text, const std::string& path,
+                                         const std::string& message, const std::string& signal);
 
 }  // namespace farpoint::ipc

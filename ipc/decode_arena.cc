@@ -20,10 +20,21 @@ bool DecodeArena::add_block(std::size_t bytes) noexcept {
     block.begin = block.memory.get() + (kAlignment - address % kAlignment) % kAlignment;
     block.bytes = bytes;
     blocks_.push_back(std::move(block));
+    block_bytes_ += bytes;
     return true;
   } catch (const std::bad_alloc&) {
     return false;
   }
+}
+
+void DecodeArena::reset() noexcept {
+  if (refused_) {
+    blocks_.resize(1);
+    block_bytes_ = blocks_.front().bytes;
+  }
+  refused_ = false;
+  block_ = 0;
+  used_ = 0;
 }
 
 void* DecodeArena::allocate(std::size_t bytes) noexcept {
@@ -34,7 +45,14 @@ void* DecodeArena::allocate(std::size_t bytes) noexcept {
     ++block_;
     used_ = 0;
   }
-  if (block_ == blocks_.size() && !add_block(std::max(bytes, kBlockBytes))) return nullptr;
+  if (block_ == blocks_.size()) {
+    const std::size_t wanted = std::max(bytes, kBlockBytes);
+    const bool fits = block_bytes_ <= most_bytes_ && wanted <= most_bytes_ - block_bytes_;
+    if (!fits || !add_block(wanted)) {
+      refused_ = true;
+      return nullptr;
+    }
+  }
   void* piece = blocks_[block_].begin + used_;
   used_ += bytes;
   return piece;

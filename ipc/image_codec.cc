@@ -17,6 +17,8 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 constexpr int kMaxJpegScans = 100;  // more only make a decoder busy
+// Largest chunk of a PNG file except its pixels, and largest colour profile.
+constexpr png_alloc_size_t kMaxPngChunkBytes = png_alloc_size_t{1} << 20;
 
 std::uint32_t big_endian_16(const std::uint8_t* p) {
   return std::uint32_t{p[0]} << 8 | p[1];
@@ -27,6 +29,13 @@ std::uint32_t big_endian_32(const std::uint8_t* p) {
 
 bool is_possible_size(std::int64_t width_px, std::int64_t height_px) {
   return width_px > 0 && height_px > 0 && width_px <= kMaxImageSide_px && height_px <= kMaxImageSide_px;
+}
+
+// Empty where an image of this size is decoded.
+std::optional<ImageStatus> refuse_size(int width_px, int height_px, std::int64_t most_pixels) {
+  if (!is_possible_size(width_px, height_px)) return ImageStatus::kWrongSize;
+  if (std::int64_t{width_px} * height_px > most_pixels) return ImageStatus::kTooLarge;
+  return std::nullopt;
 }
 
 void set_size(GreyImage* image, int width_px, int height_px) {
@@ -76,6 +85,15 @@ void read_png_bytes(png_structp png, png_bytep out, std::size_t bytes) {
 }
 void ignore_png_warning(png_structp, png_const_charp) {}
 
+// Text, however small it is compressed, and chunks without a meaning for pixels are passed over; a profile
+// has a limit. Each would be inflated in memory else.
+void bound_ancillary_chunks(png_structp png) {
+  constexpr png_uint_32 kSkipAll = 1;
+  png_set_chunk_cache_max(png, kSkipAll);
+  png_set_chunk_malloc_max(png, kMaxPngChunkBytes);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, 0);
+}
+
 // Everything becomes 8-bit grey without alpha.
 void ask_for_grey(png_structp png, png_infop info) {
   const int type = png_get_color_type(png, info);
@@ -96,7 +114,7 @@ void free_with_the_image(png_structp, png_voidp) {}
 // No object with a destructor may live here: libpng leaves by longjmp.
 ImageStatus decode_png(const image_t& message, DecodeArena* arena, GreyImage* image) {
   PngReader reader{payload(message)};
-  arena->reset();
+  arena->reset(ImageDecoder::kMaxWorkingBytes);
   png_structp png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, nullptr, leave_png, ignore_png_warning,
                                              arena, allocate_for_png, free_with_the_image);
   if (png == nullptr) return ImageStatus::kDamaged;
@@ -104,9 +122,10 @@ ImageStatus decode_png(const image_t& message, DecodeArena* arena, GreyImage* im
   volatile ImageStatus status = ImageStatus::kDamaged;
   if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
     png_destroy_read_struct(&png, &info, nullptr);
-    return ImageStatus::kDamaged;
+    return arena->has_refused() ? ImageStatus::kTooLarge : ImageStatus::kDamaged;
   }
   png_set_user_limits(png, kMaxImageSide_px, kMaxImageSide_px);
+  bound_ancillary_chunks(png);
   png_set_read_fn(png, &reader, read_png_bytes);
   png_read_info(png, info);
   const auto width_px = static_cast<int>(png_get_image_width(png, info));
@@ -177,12 +196,16 @@ struct ImageDecoder::Jpeg {
   jpeg_progress_mgr progress{};
   std::jmp_buf way_out{};
   bool damaged = false;
+  bool too_large = false;  // as a whole, for the library's own memory
   DecodeArena* arena = nullptr;
   jpeg_memory_mgr library{};  // libjpeg's own memory functions
 
   static Jpeg* of(j_common_ptr common) { return static_cast<Jpeg*>(common->client_data); }
 
-  [[noreturn]] static void leave(j_common_ptr common) { std::longjmp(of(common)->way_out, 1); }
+  [[noreturn]] static void leave(j_common_ptr common) {
+    of(common)->too_large = common->err->msg_code == JERR_NO_BACKING_STORE;
+    std::longjmp(of(common)->way_out, 1);
+  }
   static void print_nothing(j_common_ptr) {}
   // libjpeg fills what it cannot decode with grey and only warns; a tracker must not see that.
   static void note_warning(j_common_ptr common, int level) {
@@ -249,11 +272,17 @@ struct ImageDecoder::Jpeg {
 // No object with a destructor may live here: libjpeg leaves by longjmp.
 ImageStatus ImageDecoder::Jpeg::decode(Bytes file, int expected_width_px, int expected_height_px,
                                        GreyImage* image) {
-  damaged = false;
+  damaged = too_large = false;
+  errors.msg_code = 0;
   if (setjmp(way_out) != 0) {
+    too_large = too_large || arena->has_refused();
     jpeg_abort_decompress(&decoder);
-    return ImageStatus::kDamaged;
+    return too_large ? ImageStatus::kTooLarge : ImageStatus::kDamaged;
   }
+  arena->reset(kMaxWorkingBytes);
+  const std::int64_t pixels = std::int64_t{expected_width_px} * expected_height_px;
+  decoder.mem->max_memory_to_use =
+      static_cast<long>(kMaxWorkingBytes + kMaxBytesAPixel * static_cast<std::size_t>(pixels));
   jpeg_mem_src(&decoder, file.data(), static_cast<unsigned long>(file.size()));
   decoder.progress = &progress;
   jpeg_read_header(&decoder, TRUE);
@@ -285,6 +314,8 @@ const char* to_string(ImageStatus status) {
       return "unknown pixel format";
     case ImageStatus::kDamaged:
       return "damaged";
+    case ImageStatus::kTooLarge:
+      return "too large";
   }
   return "?";
 }
@@ -294,7 +325,8 @@ std::optional<ImageInfo> probe_image(Bytes file) {
   return probe_jpeg(file);
 }
 
-ImageDecoder::ImageDecoder() : jpeg_(std::make_unique<Jpeg>()) {
+ImageDecoder::ImageDecoder(std::int64_t most_pixels)
+    : most_pixels_(most_pixels), jpeg_(std::make_unique<Jpeg>()) {
   // Creation can only fail for memory or a mismatch of library versions: both leave through the error
   // handler.
   if (setjmp(jpeg_->way_out) != 0) throw std::bad_alloc();
@@ -306,10 +338,12 @@ ImageDecoder::ImageDecoder() : jpeg_(std::make_unique<Jpeg>()) {
 ImageDecoder::~ImageDecoder() = default;
 
 ImageStatus ImageDecoder::decode_jpeg(Bytes file, int width_px, int height_px, GreyImage* image) {
+  if (const auto refused = refuse_size(width_px, height_px, most_pixels_)) return *refused;
   return file.empty() ? ImageStatus::kDamaged : jpeg_->decode(file, width_px, height_px, image);
 }
 
 ImageStatus ImageDecoder::decode(const image_t& message, GreyImage* image) {
+  if (const auto refused = refuse_size(message.width, message.height, most_pixels_)) return *refused;
   switch (message.pixel_format) {
     case image_t::PIXEL_FORMAT_GREY:
       return copy_grey(message, image);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes image bytes to 8-bit grey. Damaged bytes neither throw nor crash; only lack of memory throws.
+// Decodes image bytes to 8-bit grey. Damaged bytes neither throw nor crash; only lack of memory throws. The
+// memory of one image is bounded (ImageDecoder::kMaxWorkingBytes, kMaxBytesAPixel).
 #pragma once
 
 #include <cstdint>
@@ -26,6 +27,7 @@ enum class ImageStatus : std::uint8_t {
   kWrongSize,      // the size differs from the message's, or grey bytes are missing
   kUnknownFormat,  // a pixel format outside image_t's
   kDamaged,        // the JPEG or PNG cannot be decoded in full
+  kTooLarge,       // more pixels or more working memory than the decoder's limit
 };
 [[nodiscard]] const char* to_string(ImageStatus status);
 
@@ -38,12 +40,19 @@ struct ImageInfo {
 [[nodiscard]] std::optional<ImageInfo> probe_image(std::span<const std::uint8_t> file);
 
 inline constexpr int kMaxImageSide_px = 16384;
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{64} << 20;
 
 // Keeps the decoders' working memory from image to image: no heap call after the first images, except for
-// progressive JPEGs, which are decoded as a whole. Not thread-safe: one instance a thread.
+// progressive JPEGs, which are decoded as a whole. Text and colour profiles of PNG files are skipped or
+// bounded. Not thread-safe: one instance a thread.
 class ImageDecoder {
  public:
-  ImageDecoder();
+  // Most working memory of one image. Decoders work row by row; a progressive JPEG is decoded as a whole and
+  // may take kMaxBytesAPixel more for each pixel (three full-size components take 6).
+  static constexpr std::size_t kMaxWorkingBytes = std::size_t{4} << 20, kMaxBytesAPixel = 8;
+
+  // Larger images are kTooLarge.
+  explicit ImageDecoder(std::int64_t most_pixels = kMaxImagePixels);
   ~ImageDecoder();
   ImageDecoder(const ImageDecoder&) = delete;
   ImageDecoder& operator=(const ImageDecoder&) = delete;
@@ -54,9 +63,12 @@ class ImageDecoder {
   // Decodes one JPEG file of this size from any memory, such as a camera's buffer.
   [[nodiscard]] ImageStatus decode_jpeg(std::span<const std::uint8_t> file, int width_px, int height_px,
                                         GreyImage* image);
+  // Working memory kept from image to image.
+  [[nodiscard]] std::size_t working_bytes() const { return arena_.bytes(); }
 
  private:
   struct Jpeg;
+  std::int64_t most_pixels_;
   DecodeArena arena_;  // of the image being decoded
   std::unique_ptr<Jpeg> jpeg_;
 };

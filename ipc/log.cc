@@ -50,8 +50,11 @@ struct LogReader::Header {
   [[nodiscard]] std::size_t event_bytes() const { return kHeaderBytes + channel_bytes + data_bytes; }
 };
 
-LogReader::LogReader(const std::string& path)
-    : fd_(path != "-" ? open_log(path) : STDIN_FILENO), owns_fd_(path != "-"), buffer_(2 * kReadBytes) {
+LogReader::LogReader(const std::string& path, std::size_t most_data_bytes)
+    : most_data_bytes_(most_data_bytes),
+      fd_(path != "-" ? open_log(path) : STDIN_FILENO),
+      owns_fd_(path != "-"),
+      buffer_(2 * kReadBytes) {
   // A pipe holds 64 kB, less than an image: writer and reader would alternate. Where it is none, or the
   // system allows no more, it stays as it is.
   constexpr int kPipeBytes = 1 << 20;
@@ -70,7 +73,7 @@ bool LogReader::available(std::size_t bytes) {
       end_ -= begin_;
       begin_ = 0;
     }
-    if (buffer_.size() - end_ < kReadBytes) buffer_.resize(2 * buffer_.size());
+    if (buffer_.size() - end_ < kReadBytes) grow(bytes);
     const ssize_t got = read(fd_, buffer_.data() + end_, kReadBytes);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) damage_.read_error = std::strerror(errno);
@@ -78,6 +81,16 @@ bool LogReader::available(std::size_t bytes) {
     if (got > 0) end_ += static_cast<std::size_t>(got);
   }
   return end_ - begin_ >= bytes;
+}
+
+// Makes room for `bytes` from here on and one read. A half more each time, so that copies stay few, however
+// never beyond what the largest event takes.
+void LogReader::grow(std::size_t bytes) {
+  const std::size_t needed = std::max(begin_ + bytes, end_) + kReadBytes;
+  const std::size_t most = kHeaderBytes + kMaxChannelBytes + most_data_bytes_ + 2 * kReadBytes;
+  const std::size_t wanted = std::max(needed, std::min(buffer_.size() + buffer_.size() / 2, most));
+  buffer_.reserve(wanted);  // resize() alone would double it
+  buffer_.resize(wanted);
 }
 
 // True where `ahead` bytes from here stands a header with lengths and a channel name that can be.
@@ -89,7 +102,7 @@ bool LogReader::read_header(std::size_t ahead, Header* header) {
   header->channel_bytes = big_endian(field + 20, 4);
   header->data_bytes = big_endian(field + 24, 4);
   if (header->channel_bytes == 0 || header->channel_bytes > kMaxChannelBytes) return false;
-  if (header->data_bytes > kMaxDataBytes || !available(ahead + kHeaderBytes + header->channel_bytes))
+  if (header->data_bytes > most_data_bytes_ || !available(ahead + kHeaderBytes + header->channel_bytes))
     return false;
   const std::uint8_t* name = here() + ahead + kHeaderBytes;
   return std::all_of(name, name + header->channel_bytes, is_printable);

@@ -40,8 +40,9 @@ struct LogDamage {
 
 class LogReader {
  public:
-  // "-" is standard input. Throws std::runtime_error naming a file that cannot be opened.
-  explicit LogReader(const std::string& path);
+  // "-" is standard input. A length above `most_data_bytes` counts as damage. Throws std::runtime_error
+  // naming a file that cannot be opened.
+  explicit LogReader(const std::string& path, std::size_t most_data_bytes = kMaxDataBytes);
   ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
@@ -55,13 +56,14 @@ class LogReader {
   static constexpr std::uint32_t kSyncWord = 0xEDA1DA01;
   static constexpr std::size_t kHeaderBytes = 28;
   static constexpr std::size_t kMaxChannelBytes = 255;
-  // A greater length counts as damage; far above any image.
+  // Far above any image.
   static constexpr std::size_t kMaxDataBytes = std::size_t{64} << 20;
 
  private:
   struct Header;
   // Loads `bytes` bytes from the current position, if the file has them.
   bool available(std::size_t bytes);
+  void grow(std::size_t bytes);
   [[nodiscard]] const std::uint8_t* here() const { return buffer_.data() + begin_; }
   bool read_header(std::size_t ahead, Header* header);
   bool whole_event_here(Header* header);
@@ -69,6 +71,7 @@ class LogReader {
   void skip(std::size_t bytes);
   void skip_to_sync();
 
+  std::size_t most_data_bytes_;
   int fd_ = -1;
   bool owns_fd_ = false;
   bool at_end_ = false;  // fd_ is at its end

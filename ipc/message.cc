@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/message.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -63,6 +64,9 @@ std::size_t bracket_length(std::string_view layout) {
 bool Walker::take_string() {
   std::size_t length = 0;
   if (!take_length(&length) || length == 0 || length > bytes_.size()) return false;  // the NUL is counted
+  // A NUL within would make a shorter string of it, which no longer encodes to its length.
+  const std::span<const std::uint8_t> string = bytes_.first(length);
+  if (std::find(string.begin(), string.end(), 0) != string.end() - 1) return false;
   return take(length);
 }
 

@@ -14,12 +14,12 @@
 #include <sstream>
 #include <system_error>
 
+#include "daemon/config/yaml_file.h"
 #include "ipc/can_frame.h"
+#include "ipc/printable.h"
 
 namespace farpoint::daemon {
 namespace {
-
-constexpr std::size_t kMaxFileBytes = 1 << 20;
 
 // Number of single-character edits (insert, delete, replace, swap of neighbours) between two words.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -61,6 +61,9 @@ const ConfigKey* find_key(const std::string& name) {
 
 // The known name nearest to a wrong one, as a question; or where to find the list.
 std::string suggestion(const std::string& name) {
+  constexpr std::size_t kLongestName = 100;
+  constexpr const char* kNone = "expected a key of config/farpoint.yaml";
+  if (name.size() > kLongestName) return kNone;
   std::string nearest;
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   const auto consider = [&](const std::string& candidate) {
@@ -80,7 +83,7 @@ std::string suggestion(const std::string& name) {
     }
   }
   for (const std::string& section : section_names()) consider(section);
-  if (nearest.empty()) return "expected a key of config/farpoint.yaml";
+  if (nearest.empty()) return kNone;
   return "did you mean '" + nearest + "'?";
 }
 
@@ -128,10 +131,7 @@ bool acceptable(const ConfigKey& key, const std::string& text, bool quoted) {
 
 // One line, whatever the file held.
 [[noreturn]] void fail(const std::string& place, const std::string& message) {
-  std::string line = place + ": " + message;
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, '?');
-  throw ConfigError(line);
+  throw ConfigError(ipc::printable(place + ": " + message));
 }
 
 void assign(const ConfigKey& key, const std::string& text, bool quoted, const std::string& place,
@@ -216,11 +216,11 @@ std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in)
     fail(path, "cannot be opened (" + std::generic_category().message(errno) + "), expected a YAML file");
-  std::string text(kMaxFileBytes + 1, '\0');
+  std::string text(kMaxYamlBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad()) fail(path, "cannot be read, expected a YAML file");
   text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes)
+  if (text.size() > kMaxYamlBytes)
     fail(path, "longer than 1 MiB, expected a YAML file like config/farpoint.yaml");
   return text;
 }

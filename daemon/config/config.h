@@ -130,6 +130,7 @@ struct WatchdogConfig {
 };
 
 struct Config {
+  int image_mb = 160;  // capacity.image_mb: of the images in memory; a larger image is refused
   LogConfig log;
   ControlConfig control;
   StateConfig state;

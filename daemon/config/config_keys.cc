@@ -172,6 +172,7 @@ std::vector<ConfigKey> make_keys() {
       integer("capacity.observations_per_landmark", "observations", 4, 1000,
               FIELD(estimator.capacity.observations_per_landmark)),
       integer("capacity.window_images", "images", 2, 1000, FIELD(estimator.capacity.window_images)),
+      integer("capacity.image_mb", "MB", 1, 1000000, FIELD(image_mb)),
       integer("capacity.view_landmarks", "landmarks", 500, 1000000, FIELD(estimator.capacity.view_landmarks)),
 
       number("initialisation.min_parallax_rad", "rad", 1e-4, 1,

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <vector>
 
-#include "daemon/config/config.h"
-
 namespace farpoint::daemon {
 namespace {
+
+constexpr double kBytesPerMb = 1e6;
 
 [[noreturn]] void refuse(int camera_index, const std::string& why) {
   throw InputError(fmt::format("CALIBRATION, camera {}: {}", camera_index, why));
@@ -50,7 +50,47 @@ slam::Camera camera_of(const camera_calibration_t& camera, int camera_index) {
   return slam::Camera(p);
 }
 
+// Bytes of one pyramid a pixel of the image.
+double pyramid_share(const slam::PyramidOptions& options) {
+  double share = 0.0;
+  for (int level = 0; level < options.levels; ++level) share += std::pow(options.scale_factor, -2.0 * level);
+  return share;
+}
+
+// As slam/frame_intake.cc counts them; a test compares the two.
+double pyramids(const slam::EstimatorConfig& config) {
+  constexpr double kHistoryFrames = 60.0, kInUse = 8.0;
+  const double looking = std::min(0.25 * config.initialisation.max_frames, kHistoryFrames) + 4.0;
+  return std::max(looking, config.capacity.window_images + 3.0) + kInUse;
+}
+
 }  // namespace
+
+double image_bytes(const Config& config, std::int64_t pixels) {
+  // Corners of all levels before selection, a blurred level, the grids of frames, images on their way.
+  constexpr double kBytesBesidePyramids = 16.0;
+  const double a_pixel =
+      pyramid_share(config.estimator.pyramid) * pyramids(config.estimator) + kBytesBesidePyramids;
+  return a_pixel * static_cast<double>(pixels);
+}
+
+std::int64_t most_image_pixels(const Config& config) {
+  return static_cast<std::int64_t>(config.image_mb * kBytesPerMb / image_bytes(config, 1));
+}
+
+void check_image_size(const calibration_t& calibration, const Config& config) {
+  const int index = config.camera.index;
+  if (index >= static_cast<int>(calibration.cameras.size())) return;  // make_rig() refuses it
+  const camera_calibration_t& camera = calibration.cameras[static_cast<std::size_t>(index)];
+  if (camera.width <= 0 || camera.height <= 0) return;
+  const std::int64_t pixels = std::int64_t{camera.width} * camera.height;
+  if (pixels <= most_image_pixels(config)) return;
+  refuse(index, fmt::format(
+                    "images of {} x {} need {:.0f} MB with capacity.window_images {}, expected at most {} MB "
+                    "(capacity.image_mb)",
+                    camera.width, camera.height, std::ceil(image_bytes(config, pixels) / kBytesPerMb),
+                    config.estimator.capacity.window_images, config.image_mb));
+}
 
 slam::Rig make_rig(const calibration_t& calibration, int camera_index) {
   const int cameras = static_cast<int>(calibration.cameras.size());

@@ -6,12 +6,16 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 
 #include "daemon/config/errors.h"
+#include "ipc/printable.h"
 
 namespace farpoint::daemon {
 namespace {
+
+[[noreturn]] void refuse_length(const std::filesystem::path& file) {
+  throw InputError(ipc::printable(file.string()) + ": longer than 1 MiB, expected a short YAML file");
+}
 
 std::string read_file(const std::filesystem::path& file) {
   std::error_code ignored;
@@ -21,8 +25,10 @@ std::string read_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream)
     throw InputError(file.string() + ": cannot be opened (" + std::strerror(errno ? errno : ENOENT) + ")");
-  std::string content{std::istreambuf_iterator<char>(stream), {}};
+  std::string content(kMaxYamlBytes + 1, '\0');
+  stream.read(content.data(), static_cast<std::streamsize>(content.size()));
   if (stream.bad()) throw InputError(file.string() + ": cannot be read to its end");
+  content.resize(static_cast<std::size_t>(stream.gcount()));
   return content;
 }
 
@@ -31,16 +37,19 @@ std::string read_file(const std::filesystem::path& file) {
 YamlFile::YamlFile(std::filesystem::path file) : YamlFile(file, read_file(file)) {}
 
 YamlFile::YamlFile(std::filesystem::path file, const std::string& content) : path_(std::move(file)) {
+  if (content.size() > kMaxYamlBytes) refuse_length(path_);
   try {
     root_ = YAML::Load(content);
   } catch (const YAML::Exception& e) {
-    throw InputError(path_.string() + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+    throw InputError(ipc::printable(path_.string() + ":" + std::to_string(e.mark.line + 1) +
+                                    ": not valid YAML: " + e.msg));
   }
   if (!root_.IsMap()) throw InputError(path_.string() + ":1: expected 'key: value' lines");
 }
 
 void YamlFile::fail(const YAML::Node& node, const std::string& message) const {
-  throw InputError(path_.string() + ":" + std::to_string(node.Mark().line + 1) + ": " + message);
+  throw InputError(
+      ipc::printable(path_.string() + ":" + std::to_string(node.Mark().line + 1) + ": " + message));
 }
 
 YAML::Node YamlFile::require(const std::string& key) const {

@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -13,9 +14,13 @@
 
 namespace farpoint::daemon {
 
+// Longer YAML files are refused before they are parsed.
+inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
+
 class YamlFile {
  public:
-  // Throws InputError if the file cannot be read, is no YAML, or its top is no map.
+  // Throws InputError if the file cannot be read, is longer than kMaxYamlBytes, is no YAML, or its top is no
+  // map. Every error is one line.
   explicit YamlFile(std::filesystem::path file);
   // Reads a file's content; `file` names it in errors.
   YamlFile(std::filesystem::path file, const std::string& content);

@@ -11,9 +11,9 @@
 namespace farpoint::daemon {
 namespace {
 
-drivers::LogSource open_source(const std::string& path) {
+drivers::LogSource open_source(const std::string& path, const Config& config) {
   try {
-    return drivers::LogSource(path);
+    return drivers::LogSource(path, most_image_pixels(config), config.camera.index);
   } catch (const std::runtime_error& error) {
     const std::string what = error.what();
     const bool says = what.find("expected") != std::string::npos;
@@ -33,8 +33,8 @@ std::string damage_text(const ipc::LogDamage& damage) {
 
 }  // namespace
 
-LogFrameSource::LogFrameSource(const std::string& path, int camera_index)
-    : name_(path == "-" ? "standard input" : path), camera_index_(camera_index), source_(open_source(path)) {
+LogFrameSource::LogFrameSource(const std::string& path, const Config& config)
+    : name_(path == "-" ? "standard input" : path), config_(config), source_(open_source(path, config)) {
   std::error_code error;
   const auto bytes = std::filesystem::file_size(path, error);
   if (path != "-" && !error) file_bytes_ = static_cast<double>(bytes);
@@ -46,7 +46,7 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
     offset_ = item.offset;
     if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
     feed(item);
-    if (item.kind != drivers::LogItemKind::kImage || item.camera != camera_index_) continue;
+    if (item.kind != drivers::LogItemKind::kImage || item.camera != config_.camera.index) continue;
     if (!calibration_) {
       ++before_calibration_;
       continue;
@@ -54,7 +54,10 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
     const StageScope scope(clock, timing_t::STAGE_DECODE);
     const ipc::ImageStatus status = source_.decode(item, &image_);
     if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
-    if (status != ipc::ImageStatus::kOk) continue;
+    if (status != ipc::ImageStatus::kOk) {
+      say_undecodable(status);
+      continue;
+    }
     *frame = {item.utime, item.image->sequence, &image_};
     gave_image_ = true;
     given_utime_ = item.utime;
@@ -65,6 +68,13 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   }
   if (!gave_image_) refuse_empty();
   return false;
+}
+
+// Once: the counts say how many follow.
+void LogFrameSource::say_undecodable(ipc::ImageStatus status) {
+  if (std::exchange(said_undecodable_, true)) return;
+  spdlog::warn("{}: image at byte {} is left out ({}), expected one that can be decoded", name_, offset_,
+               to_string(status));
 }
 
 void LogFrameSource::feed(const drivers::LogItem& item) {
@@ -92,6 +102,11 @@ void LogFrameSource::feed_to(MeasurementFeed* feed) {
 
 void LogFrameSource::take_calibration(const calibration_t& calibration) {
   if (!calibration_) {
+    try {
+      check_image_size(calibration, config_);
+    } catch (const InputError& error) {
+      throw InputError(name_ + ": " + error.what());
+    }
     calibration_ = calibration;
     return;
   }
@@ -115,7 +130,7 @@ void LogFrameSource::refuse_empty() const {
       fmt::format("{}: no usable image of CAMERA_{} in {} events, expected images (other cameras {}, before "
                   "the calibration {}, "
                   "wrong size {}, undecodable {}, unknown camera {}, time not after the one before {}){}",
-                  name_, camera_index_, source_.events(), as_signed(c.images) - before_calibration_,
+                  name_, config_.camera.index, source_.events(), as_signed(c.images) - before_calibration_,
                   before_calibration_, c.images_wrong_size, c.images_undecodable + c.messages_undecodable,
                   c.images_unknown_camera, c.times_backwards, damage));
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/config/config.h"
 #include "daemon/input/frame_source.h"
 #include "daemon/input/measurement_feed.h"
 #include "drivers/log/log_source.h"
@@ -17,10 +18,11 @@ namespace farpoint::daemon {
 class LogFrameSource final : public FrameSource {
  public:
   // "-" is standard input. Throws InputError if the log cannot be opened.
-  LogFrameSource(const std::string& path, int camera_index);
+  LogFrameSource(const std::string& path, const Config& config);
 
   // Throws InputError at the end of a log without any accepted image. The line names the cause: no
-  // calibration, no such camera, nothing decodable.
+  // calibration, no such camera, nothing decodable. Also throws InputError for a calibration whose images
+  // need more memory than capacity.image_mb, before it allocates any.
   [[nodiscard]] bool next(SourceFrame* frame, StageClock* clock) override;
   // After the first image. Feeds the IMU and WHEELS messages read so far, and from now on those that next()
   // reads on its way to an image. Passes over messages not after the first image: no frame precedes them.
@@ -42,16 +44,17 @@ class LogFrameSource final : public FrameSource {
  private:
   void take_calibration(const calibration_t& calibration);
   void feed(const drivers::LogItem& item);
+  void say_undecodable(ipc::ImageStatus status);
   void keep_early(const drivers::LogItem& item);
   [[noreturn]] void refuse_empty() const;
 
   std::string name_;
-  int camera_index_;
+  const Config config_;
   drivers::LogSource source_;
   std::optional<calibration_t> calibration_;
   int calibrations_ignored_ = 0;
   std::int64_t before_calibration_ = 0, wrong_size_decoded_ = 0;
-  bool gave_image_ = false;
+  bool gave_image_ = false, said_undecodable_ = false;
   MeasurementFeed* feed_ = nullptr;
   // Read before feed_to(), the newest kEarly of each: the source may read beyond the first image before it
   // gives it.

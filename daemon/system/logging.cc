@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/system/logging.h"
 
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -8,15 +9,31 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 
+#include "daemon/system/service_log.h"
 #include "daemon/system/stage_clock.h"
 
 namespace farpoint::daemon {
+namespace {
+
+// Standard error, one line a message.
+class StandardError final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  StandardError() { stream_.set_pattern("farpointd: %l: %v"); }
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override { hand_on_one_line(message, &stream_); }
+  void flush_() override { stream_.flush(); }
+
+ private:
+  spdlog::sinks::stderr_sink_st stream_;
+};
+
+}  // namespace
 
 void start_logging(const std::string& level) {
-  auto logger =
-      std::make_shared<spdlog::logger>("farpointd", std::make_shared<spdlog::sinks::stderr_sink_st>());
-  logger->set_pattern("farpointd: %l: %v");
+  auto logger = std::make_shared<spdlog::logger>("farpointd", std::make_shared<StandardError>());
   logger->set_level(spdlog::level::from_str(level));
   spdlog::set_default_logger(std::move(logger));
 }

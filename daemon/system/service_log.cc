@@ -13,6 +13,8 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "ipc/printable.h"
+
 namespace farpoint::daemon {
 namespace {
 
@@ -114,6 +116,15 @@ void RateLimitedSink::add(spdlog::sink_ptr sink) {
   sinks_.push_back(std::move(sink));
 }
 
+void hand_on_one_line(const spdlog::details::log_msg& message, spdlog::sinks::sink* sink) {
+  const std::string_view text(message.payload.data(), message.payload.size());
+  if (ipc::is_printable_line(text)) return sink->log(message);
+  const std::string line = ipc::printable(text);
+  spdlog::details::log_msg plain = message;
+  plain.payload = line;
+  sink->log(plain);
+}
+
 void RateLimitedSink::sink_it_(const spdlog::details::log_msg& message) {
   if (!may_pass(message)) {
     ++left_out_;
@@ -138,7 +149,7 @@ bool RateLimitedSink::may_pass(const spdlog::details::log_msg& message) {
 }
 
 void RateLimitedSink::hand_on(const spdlog::details::log_msg& message) {
-  for (const spdlog::sink_ptr& sink : sinks_) sink->log(message);
+  for (const spdlog::sink_ptr& sink : sinks_) hand_on_one_line(message, sink.get());
 }
 
 void RateLimitedSink::flush_() {

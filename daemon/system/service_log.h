@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The log of a service: to the journal (or standard error) and a rotating file, written on a thread of its
-// own (fp-log). Logging threads never wait; the message rate is limited.
+// own (fp-log). Logging threads never wait; the message rate is limited. Every message is one line: control
+// characters are escaped, so that no text from outside forges a line or its priority.
 #pragma once
 
 #include <memory>
@@ -19,6 +20,9 @@ void start_service_log(const LogConfig& config);
 void open_log_file(const LogConfig& config);
 // Writes the remaining messages.
 void stop_service_log();
+
+// Hands a message to a sink as one line of printable characters.
+void hand_on_one_line(const spdlog::details::log_msg& message, spdlog::sinks::sink* sink);
 
 // Passes at most kBurst messages at once and kPerSecond a second after that. Reports the number of dropped
 // ones when there is room again. Errors always pass.

@@ -50,7 +50,38 @@ std::int64_t step_us(std::int64_t from, std::int64_t to) {
   return static_cast<std::int64_t>(std::min(step, static_cast<std::uint64_t>(kLongest_us)));
 }
 
+constexpr std::size_t kImageBytesAPixel = 2;
+
+// Largest image message: two bytes a pixel and its header.
+std::size_t most_image_bytes(std::int64_t most_pixels) {
+  constexpr std::size_t kHeader = std::size_t{64} << 10;
+  return kImageBytesAPixel * static_cast<std::size_t>(std::max<std::int64_t>(most_pixels, 0)) + kHeader;
+}
+
+// Largest event of a recording.
+std::size_t most_event_bytes(std::int64_t most_pixels) {
+  constexpr std::size_t kOtherMessages = std::size_t{8} << 20;
+  return std::clamp(most_image_bytes(most_pixels), kOtherMessages, ipc::LogReader::kMaxDataBytes);
+}
+
+// The image's fields without its data; *to keeps its own memory.
+void copy_without_data(image_t* from, image_t* to) {
+  std::vector<std::uint8_t> of_from, of_to;
+  of_from.swap(from->data);
+  of_to.swap(to->data);
+  *to = *from;
+  from->data.swap(of_from);
+  of_to.clear();
+  to->data.swap(of_to);
+}
+
 }  // namespace
+
+LogSource::LogSource(const std::string& path, std::int64_t most_pixels, int only_camera)
+    : most_pixels_(most_pixels),
+      only_camera_(only_camera),
+      reader_(path, most_event_bytes(most_pixels)),
+      decoder_(most_pixels) {}
 
 bool LogSource::next(LogItem* item) {
   *item = {};
@@ -99,7 +130,18 @@ bool LogSource::accept_time(std::int64_t utime, bool check_leap, Stream* stream)
   return true;
 }
 
+void LogSource::move_image(int camera, image_t* from, image_t* to) const {
+  if (only_camera_ == kAllCameras || camera == only_camera_)
+    std::swap(*from, *to);
+  else
+    copy_without_data(from, to);
+}
+
 bool LogSource::take_image(int camera, const ipc::LogEvent& event, LogItem* item) {
+  if (event.data.size() > most_image_bytes(most_pixels_)) {
+    ++counts_.images_wrong_size;
+    return false;
+  }
   if (!decode_message(event, &image_)) return false;
   const bool calibrated = !has_calibration_ || camera < calibration_.ncameras;
   if (camera >= kMaxCameras || camera != image_.camera || !calibrated) {
@@ -137,7 +179,7 @@ bool LogSource::judge_image(int camera, std::uint64_t offset, LogItem* item) {
   }
   if (std::exchange(s.holds, false)) ++counts_.times_backwards;
   if (s.pace_us == 0 || step_us(s.last, utime) > s.pace_us + s.pace_us / 2) {
-    std::swap(s.held, image_);
+    move_image(camera, &image_, &s.held);
     s.held_offset = offset;
     s.holds = true;
     return false;
@@ -148,7 +190,7 @@ bool LogSource::judge_image(int camera, std::uint64_t offset, LogItem* item) {
 
 void LogSource::give_image(image_t* image, int camera, std::uint64_t offset, LogItem* item) {
   CameraStream& s = camera_streams_[static_cast<std::size_t>(camera)];
-  std::swap(given_, *image);
+  move_image(camera, image, &given_);
   if (s.last != Stream::kNone) {
     // A slower pace shows itself at once, a gap is none.
     const std::int64_t step = step_us(s.last, given_.utime);
@@ -223,14 +265,15 @@ bool LogSource::take_calibration(const ipc::LogEvent& event, LogItem* item) {
   return true;
 }
 
-// So that no image of usual size makes a message's buffer grow later.
+// Makes room so that no image of usual size makes a message's buffer grow later.
 void LogSource::reserve_images() {
   constexpr std::int64_t kMostReserved = std::int64_t{8} << 20;
   std::size_t most = 0;
   for (std::size_t c = 0; c < std::min(calibration_.cameras.size(), camera_streams_.size()); ++c) {
     const camera_calibration_t& camera = calibration_.cameras[c];
+    if (only_camera_ != kAllCameras && static_cast<int>(c) != only_camera_) continue;
     const std::int64_t pixels = std::int64_t{std::max(camera.width, 0)} * std::max(camera.height, 0);
-    const auto bytes = static_cast<std::size_t>(std::min(pixels, kMostReserved));
+    const auto bytes = static_cast<std::size_t>(std::min({pixels, most_pixels_, kMostReserved}));
     camera_streams_[c].held.data.reserve(bytes);
     most = std::max(most, bytes);
   }
@@ -256,7 +299,8 @@ bool LogSource::take_ground_truth(const ipc::LogEvent& event, LogItem* item) {
 ipc::ImageStatus LogSource::decode(const LogItem& item, ipc::GreyImage* image) {
   const ipc::ImageStatus status = decoder_.decode(*item.image, image);
   if (status == ipc::ImageStatus::kWrongSize) ++counts_.images_wrong_size;
-  if (status == ipc::ImageStatus::kDamaged || status == ipc::ImageStatus::kUnknownFormat)
+  if (status == ipc::ImageStatus::kDamaged || status == ipc::ImageStatus::kUnknownFormat ||
+      status == ipc::ImageStatus::kTooLarge)
     ++counts_.images_undecodable;
   return status;
 }

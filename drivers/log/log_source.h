@@ -60,8 +60,13 @@ class LogSource {
   // one confirms it; at the end of the log it is accepted up to this leap.
   static constexpr std::int64_t kMaxLeap_us = 2'000'000;
 
-  // "-" is standard input. Throws std::runtime_error naming the log where it cannot be opened.
-  explicit LogSource(const std::string& path) : reader_(path) {}
+  static constexpr int kAllCameras = -1;
+
+  // "-" is standard input. Images of more pixels, and events longer than any such image, are refused. With
+  // `only_camera` images of other cameras come without their data. Throws std::runtime_error naming the log
+  // where it cannot be opened.
+  explicit LogSource(const std::string& path, std::int64_t most_pixels = ipc::kMaxImagePixels,
+                     int only_camera = kAllCameras);
 
   // Returns the next measurement that passes the checks; false at the end. A held image follows the
   // measurements read meanwhile. From the first calibration on, images are checked against it.
@@ -104,6 +109,11 @@ class LogSource {
   template <typename Message>
   bool decode_message(const ipc::LogEvent& event, Message* message);
 
+  // Swaps two images, or copies one without its data.
+  void move_image(int camera, image_t* from, image_t* to) const;
+
+  std::int64_t most_pixels_;
+  int only_camera_;
   ipc::LogReader reader_;
   ipc::ImageDecoder decoder_;
   LogSourceCounts counts_;

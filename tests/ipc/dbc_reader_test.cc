@@ -199,6 +199,15 @@ TEST_F(DbcText, MistakesAreNamed) {
 }
 
 // The shipped file describes our own frames: its signals can be read too.
+TEST(DbcFile, OneThatDoesNotEndIsRefused) {
+  try {
+    (void)read_dbc_signal("/dev/zero", "Wheels", "FrontLeft");
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "/dev/zero: longer than 16 MiB, expected a DBC file");
+  }
+}
+
 TEST(DbcShipped, IsRead) {
   const DbcSignal age =
       read_dbc_signal(test::source_dir() + "/config/farpoint.dbc", "FARPOINT_STATUS", "Age");

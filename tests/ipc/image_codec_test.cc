@@ -8,14 +8,17 @@
 #include <random>
 #include <string>
 
-#include <png.h>
-
 #include "tests/ipc/jpeg_images.h"
+#include "tests/ipc/png_images.h"
 
 namespace farpoint::ipc {
 namespace {
 
+using test::deflated_zeros;
+using test::PngKind;
+using test::put_png_chunk;
 using test::to_jpeg;
+using test::to_png;
 using Bytes = std::vector<std::uint8_t>;
 
 // A smooth picture: JPEG keeps it within a few grey levels.
@@ -28,31 +31,6 @@ Bytes picture(int width_px, int height_px, int channels) {
       }
     }
   }
-  return out;
-}
-
-Bytes to_png(const Bytes& pixels, int width_px, int height_px, int type, int depth, int interlace) {
-  Bytes out;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  png_set_write_fn(
-      png, &out,
-      [](png_structp p, png_bytep data, std::size_t size) {
-        auto* bytes = static_cast<Bytes*>(png_get_io_ptr(p));
-        bytes->insert(bytes->end(), data, data + size);
-      },
-      nullptr);
-  png_set_IHDR(png, info, png_uint_32(width_px), png_uint_32(height_px), depth, type, interlace,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_write_info(png, info);
-  const std::size_t row_bytes = png_get_rowbytes(png, info);
-  std::vector<png_bytep> rows;
-  for (int v = 0; v < height_px; ++v) {
-    rows.push_back(const_cast<png_bytep>(pixels.data()) + static_cast<std::size_t>(v) * row_bytes);
-  }
-  png_write_image(png, rows.data());
-  png_write_end(png, nullptr);
-  png_destroy_write_struct(&png, &info);
   return out;
 }
 
@@ -135,15 +113,18 @@ TEST(ImageCodec, PngOfEveryKind) {
     rgba.insert(rgba.end(), {value, value, value, 200});
     grey16.insert(grey16.end(), {value, value});
   }
-  for (const int interlace : {PNG_INTERLACE_NONE, PNG_INTERLACE_ADAM7}) {
-    for (const auto& [pixels, type, depth] :
-         {std::tuple{grey, PNG_COLOR_TYPE_GRAY, 8}, std::tuple{rgb, PNG_COLOR_TYPE_RGB, 8},
-          std::tuple{rgba, PNG_COLOR_TYPE_RGB_ALPHA, 8}, std::tuple{grey16, PNG_COLOR_TYPE_GRAY, 16}}) {
-      const image_t in = message(image_t::PIXEL_FORMAT_PNG, width_px, height_px,
-                                 to_png(pixels, width_px, height_px, type, depth, interlace));
-      ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk) << type << " " << depth;
-      EXPECT_LE(largest_difference(image.pixels, grey), 1) << type << " " << depth;
-    }
+  for (const auto& [pixels, kind] : {std::pair{grey, PngKind::kGrey},
+                                     {grey, PngKind::kGreyInterlaced},
+                                     {rgb, PngKind::kRgb},
+                                     {rgb, PngKind::kRgbInterlaced},
+                                     {rgba, PngKind::kRgba},
+                                     {rgba, PngKind::kRgbaInterlaced},
+                                     {grey16, PngKind::kGrey16},
+                                     {grey16, PngKind::kGrey16Interlaced}}) {
+    const image_t in =
+        message(image_t::PIXEL_FORMAT_PNG, width_px, height_px, to_png(pixels, width_px, height_px, kind));
+    ASSERT_EQ(decoder.decode(in, &image), ImageStatus::kOk) << static_cast<int>(kind);
+    EXPECT_LE(largest_difference(image.pixels, grey), 1) << static_cast<int>(kind);
   }
 }
 
@@ -153,8 +134,7 @@ TEST(ImageCodec, AnotherSizeThanTheMessageSaysIsRefused) {
   const Bytes grey = picture(40, 30, 1);
   EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, 41, 30, to_jpeg(grey, 40, 30, 1)), &image),
             ImageStatus::kWrongSize);
-  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 31,
-                                   to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE)),
+  EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 31, to_png(grey, 40, 30, PngKind::kGrey)),
                            &image),
             ImageStatus::kWrongSize);
 }
@@ -166,7 +146,7 @@ TEST(ImageCodec, ProbeTellsSizeAndKind) {
   EXPECT_EQ(jpeg->pixel_format, +image_t::PIXEL_FORMAT_MJPEG);
   EXPECT_EQ(jpeg->width_px, 40);
   EXPECT_EQ(jpeg->height_px, 30);
-  const auto png = probe_image(to_png(grey, 40, 30, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+  const auto png = probe_image(to_png(grey, 40, 30, PngKind::kGrey));
   ASSERT_TRUE(png);
   EXPECT_EQ(png->pixel_format, +image_t::PIXEL_FORMAT_PNG);
   EXPECT_EQ(png->width_px, 40);
@@ -175,13 +155,75 @@ TEST(ImageCodec, ProbeTellsSizeAndKind) {
   EXPECT_FALSE(probe_image(grey));
 }
 
+// Zeros of 0.9 or 8 MB in each chunk, a few kB compressed.
+TEST(ImageCodec, TextOfAPngTakesNoMemory) {
+  const Bytes grey = picture(40, 30, 1);
+  for (const std::size_t inflated : {std::size_t{900} << 10, std::size_t{8} << 20}) {
+    const Bytes zeros = deflated_zeros(inflated);
+    Bytes text = {'x', 0, 0}, international = {'x', 0, 1, 0, 0, 0};
+    for (Bytes* content : {&text, &international})
+      content->insert(content->end(), zeros.begin(), zeros.end());
+    const std::pair<std::string, Bytes> chunks[] = {{"zTXt", text}, {"iTXt", international}, {"iCCP", text}};
+    for (const auto& [name, content] : chunks) {
+      Bytes png = to_png(grey, 40, 30, PngKind::kGrey);
+      for (int i = 0; i < 20; ++i) put_png_chunk(name, content, &png);
+      ImageDecoder decoder;
+      GreyImage image;
+      ASSERT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_PNG, 40, 30, png), &image), ImageStatus::kOk)
+          << name;
+      EXPECT_EQ(image.pixels, grey) << name;
+      EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes) << name;
+    }
+  }
+}
+
+TEST(ImageCodec, AProgressiveJpegOfAnyShapeIsDecodedWithinTheLimit) {
+  for (const auto& [width_px, height_px] : {std::pair{4096, 16}, {16, 4096}, {16384, 1}, {1, 16384}}) {
+    Bytes rgb(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px) * 3, 77);
+    const Bytes jpeg = to_jpeg(rgb, width_px, height_px, 3, true);
+    ImageDecoder decoder;
+    GreyImage image;
+    EXPECT_EQ(decoder.decode(message(image_t::PIXEL_FORMAT_MJPEG, width_px, height_px, jpeg), &image),
+              ImageStatus::kOk);
+    EXPECT_LE(decoder.working_bytes(), ImageDecoder::kMaxWorkingBytes);
+  }
+}
+
+TEST(ImageCodec, MorePixelsThanTheLimitAreRefused) {
+  const Bytes grey = picture(40, 30, 1);
+  const std::pair<std::int32_t, Bytes> images[] = {
+      {image_t::PIXEL_FORMAT_GREY, grey},
+      {image_t::PIXEL_FORMAT_MJPEG, to_jpeg(grey, 40, 30, 1)},
+      {image_t::PIXEL_FORMAT_PNG, to_png(grey, 40, 30, PngKind::kGrey)}};
+  for (const auto& [format, data] : images) {
+    GreyImage image;
+    EXPECT_EQ(ImageDecoder(1200).decode(message(format, 40, 30, data), &image), ImageStatus::kOk);
+    EXPECT_EQ(ImageDecoder(1199).decode(message(format, 40, 30, data), &image), ImageStatus::kTooLarge);
+  }
+}
+
+TEST(DecodeArena, AllocatesUpToItsLimitAndStartsAnewAfterIt) {
+  DecodeArena arena;
+  arena.reset(std::size_t{3} << 20);
+  EXPECT_NE(arena.allocate(1000), nullptr);
+  EXPECT_NE(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_FALSE(arena.has_refused());
+  EXPECT_EQ(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_TRUE(arena.has_refused());
+  EXPECT_LE(arena.bytes(), std::size_t{3} << 20);
+  arena.reset();
+  EXPECT_FALSE(arena.has_refused());
+  EXPECT_EQ(arena.bytes(), std::size_t{1} << 20) << "blocks of another image's sizes are not in the way";
+  EXPECT_NE(arena.allocate(std::size_t{2} << 20), nullptr);
+  EXPECT_EQ(arena.allocate(SIZE_MAX), nullptr);
+}
+
 class DamagedImage : public testing::TestWithParam<bool> {
  protected:
   [[nodiscard]] image_t intact() const {
     const Bytes grey = picture(64, 48, 1);
     return GetParam() ? message(image_t::PIXEL_FORMAT_MJPEG, 64, 48, to_jpeg(grey, 64, 48, 1))
-                      : message(image_t::PIXEL_FORMAT_PNG, 64, 48,
-                                to_png(grey, 64, 48, PNG_COLOR_TYPE_GRAY, 8, PNG_INTERLACE_NONE));
+                      : message(image_t::PIXEL_FORMAT_PNG, 64, 48, to_png(grey, 64, 48, PngKind::kGrey));
   }
 };
 

@@ -286,6 +286,23 @@ TYPED_TEST(EveryMessage, NoiseIsRefused) {
 }
 
 // The lengths that break lcm-gen's own decoder.
+TEST(Message, AStringEndsAtItsOnlyNul) {
+  simulation_t message{};
+  message.world_name = "town";
+  Bytes data;
+  encode(message, &data);
+  constexpr std::size_t kFirstCharacter = 8 + 8 + 4 + 4;  // fingerprint, utime, version, length
+  simulation_t decoded;
+  ASSERT_TRUE(decode(data, &decoded));
+  for (std::size_t i = 0; i < 4; ++i) {
+    Bytes damaged = data;
+    damaged[kFirstCharacter + i] = 0;
+    EXPECT_FALSE(decode(damaged, &decoded)) << i;
+  }
+  data[kFirstCharacter + 4] = 'x';
+  EXPECT_FALSE(decode(data, &decoded)) << "no NUL";
+}
+
 TEST(Message, HostileLengths) {
   image_t image{};
   image.size = 4;

@@ -168,7 +168,7 @@ std::vector<TrackedFrame> GapExperiment::replay(const std::vector<Gap>& gaps,
   tools::Trajectory truth = tools::read_recording_log(log_).truth;
   if (truth.poses.empty() || !truth.has_orientation)
     throw std::runtime_error(log_ + ": no truth with rotation");
-  daemon::LogFrameSource source(log_, 0);
+  daemon::LogFrameSource source(log_, daemon::Config{});
   daemon::StageClock clock;
   daemon::SourceFrame frame;
   if (!source.next(&frame, &clock)) return {};

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "tests/simulate/small_worlds.h"
+#include "tools/common/errors.h"
 #include "tools/evaluate/landmark_metrics.h"
 
 namespace farpoint::tools {
@@ -83,7 +86,7 @@ std::unique_ptr<SimulatedWorld> LandmarkTruth::world;
 
 TEST_F(LandmarkTruth, PerfectLandmarksHaveNoError) {
   const std::vector<JudgedLandmark> judged =
-      world->judge(landmarks_at(grid(), 1.0, 0.01F), 0, pairs_, map_to_world_);
+      world->judge(landmarks_at(grid(), 1.0, 0.01F), 0, pairs_, map_to_world_).landmarks;
   ASSERT_EQ(judged.size(), grid().size());
   int surfaces = 0, skies = 0;
   for (const JudgedLandmark& l : judged) {
@@ -107,7 +110,7 @@ TEST_F(LandmarkTruth, PerfectLandmarksHaveNoError) {
 
 TEST_F(LandmarkTruth, AnErrorOfDistanceComesOutInPercentAndInSigmas) {
   const std::vector<JudgedLandmark> judged =
-      world->judge(landmarks_at(grid(), 1.1, 0.05F), 0, pairs_, map_to_world_);
+      world->judge(landmarks_at(grid(), 1.1, 0.05F), 0, pairs_, map_to_world_).landmarks;
   for (const JudgedLandmark& l : judged) {
     if (l.target != LandmarkTarget::kSurface) continue;
     EXPECT_NEAR(l.distance_m / l.true_distance_m, 1.1, 1e-5);
@@ -137,6 +140,52 @@ TEST_F(LandmarkTruth, TheScaleIsThatOfTheStretchWhereALandmarkWasSeen) {
   std::vector<PosePair> standing = pairs_;
   for (PosePair& pair : standing) pair.T_world_body.t.setZero();
   EXPECT_EQ(local_scale(standing, 4.0, 99.0), 99.0) << "no way to measure";
+}
+
+TEST_F(LandmarkTruth, LandmarksOutsideTheRecordingAreCountedAndLeftOut) {
+  constexpr std::int64_t kOutside_us[] = {-1, 10'000'000, INT64_MAX, INT64_MIN, 9'000'000'000'000'000};
+  landmarks_t message = landmarks_at({{100.0, 40.0}}, 1.0, 0.01F);
+  const landmark_t right = message.landmarks.front();
+  std::vector<landmark_t> wrong;
+  const auto add = [&](const std::function<void(landmark_t*)>& spoil) { spoil(&wrong.emplace_back(right)); };
+  for (const int camera : {-1, 1, INT32_MIN, INT32_MAX})
+    add([camera](landmark_t* l) { l->anchor_camera = camera; });
+  for (const std::int64_t utime : kOutside_us) {
+    add([utime](landmark_t* l) { l->anchor_utime = utime; });
+    add([utime](landmark_t* l) { l->created_utime = utime; });
+  }
+  for (const float pixel : {-1.0F, 311.0F, 1e30F, std::nanf("")}) {
+    add([pixel](landmark_t* l) { l->anchor_pixel[0] = pixel; });
+    add([pixel](landmark_t* l) { l->anchor_pixel[1] = pixel; });
+  }
+  add([](landmark_t* l) { l->position[1] = NAN; });
+  add([](landmark_t* l) { l->distance = INFINITY; });
+  add([](landmark_t* l) { l->relative_sigma = NAN; });
+  message.landmarks.insert(message.landmarks.end(), wrong.begin(), wrong.end());
+  const JudgedLandmarks judged = world->judge(message, 0, pairs_, map_to_world_);
+  EXPECT_EQ(judged.landmarks.size(), 1U);
+  EXPECT_EQ(judged.refused, wrong.size());
+}
+
+TEST_F(LandmarkTruth, AMessageOfAnImpossibleSimulationIsRefused) {
+  const simulation_t right = simulation->message();
+  const auto expect_refused = [&](const std::function<void(simulation_t*)>& spoil, const std::string& what) {
+    simulation_t message = right;
+    spoil(&message);
+    try {
+      (void)simulate::Simulation::request_of(message);
+      ADD_FAILURE() << what << ": accepted";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+    }
+  };
+  for (const double duration : {std::nan(""), -1.0, 0.0, 1e300})
+    expect_refused([duration](simulation_t* m) { m->duration = duration; }, "SIMULATION: duration");
+  for (const int side : {0, -94, 31, 4097, INT32_MAX}) {
+    expect_refused([side](simulation_t* m) { m->width = side; }, "SIMULATION: images of");
+    expect_refused([side](simulation_t* m) { m->height = side; }, "SIMULATION: images of");
+  }
+  EXPECT_NO_THROW((void)simulate::Simulation::request_of(right));
 }
 
 JudgedLandmark judged_at(double distance_m, LandmarkTarget target, bool through_vmp) {

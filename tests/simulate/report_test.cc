@@ -42,6 +42,19 @@ TEST(Plot, TicksAreRoundAndInside) {
   }
 }
 
+TEST(Plot, TicksOfImpossibleRangesAreFew) {
+  for (const bool is_log : {false, true}) {
+    for (const auto& [low, high] : {std::pair(1e17, 1e17 + 100.0),
+                                    {5e-324, 1e300},
+                                    {-1e300, 1e300},
+                                    {1.0, INFINITY},
+                                    {NAN, NAN},
+                                    {1e300, 1.0000001e300},
+                                    {0.0, 5e-324}})
+      EXPECT_LE(ticks(low, high, 6, is_log).size(), 4000U) << low << " " << high;
+  }
+}
+
 TEST(Plot, NamesAxesAndLines) {
   Plot plot({"Title & more", {"x, m"}, {"y, s"}, false, 400, 300});
   EXPECT_EQ(plot.svg(), "") << "nothing to show";

@@ -46,7 +46,7 @@ FrameTimes times_of(const daemon::StageClock& clock) {
 
 BenchPass run_pass(const BenchOptions& options, const daemon::Config& config,
                    const std::function<void(double)>& progress) {
-  daemon::LogFrameSource source(options.log, config.camera.index);
+  daemon::LogFrameSource source(options.log, config);
   std::unique_ptr<slam::Estimator> estimator;
   Yardstick yardstick;
   daemon::StageClock clock;

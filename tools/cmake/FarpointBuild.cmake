@@ -32,6 +32,8 @@ if(FARPOINT_SANITIZE)
   add_link_options(-fsanitize=${FARPOINT_SANITIZE})
 endif()
 
+option(FARPOINT_FUZZ "Programs of libFuzzer, for clang: tests/fuzz/run" OFF)
+
 # farpoint_library(name): every *.cc of the current folder and below becomes a static library.
 function(farpoint_library name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cc)

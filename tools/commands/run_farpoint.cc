@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <string>
 
+#include "ipc/printable.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
 
@@ -13,10 +14,7 @@ namespace {
 int report(const std::string& message, int status) {
   std::string line = message;
   while (!line.empty() && line.back() == '\n') line.pop_back();
-  for (char& c : line) {
-    if (c == '\n') c = ' ';
-  }
-  std::fprintf(stderr, "farpoint: %s\n", line.c_str());
+  std::fprintf(stderr, "farpoint: %s\n", ipc::printable(line).c_str());
   return status;
 }
 

@@ -198,14 +198,16 @@ std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Tr
   if (truth.poses.empty()) return std::nullopt;
   const std::vector<PosePair> pairs = pair_interpolated(truth, estimate, tolerance_s);
   if (pairs.size() < 2) return std::nullopt;
+  // Far above any camera's rate. Poses of a damaged log may all lie within one second.
+  constexpr std::size_t kMostPosesASecond = 1000;
   const double half_frame_s = 0.5 * median_interval_s(pairs);
   OneSecondError result;
   std::vector<double> translations_m, rotations_deg;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     double best_offset_s = half_frame_s;
     std::optional<SE3> one_second;
-    for (std::size_t j = i + 1; j < pairs.size() && pairs[j].time_s - pairs[i].time_s <= 1.0 + half_frame_s;
-         ++j) {
+    const std::size_t end = std::min(pairs.size(), i + kMostPosesASecond);
+    for (std::size_t j = i + 1; j < end && pairs[j].time_s - pairs[i].time_s <= 1.0 + half_frame_s; ++j) {
       if (pairs[j].map_id != pairs[i].map_id) continue;
       const SE3 error = motion_error(pairs[i].T_world_body, pairs[j].T_world_body, pairs[i].T_map_body,
                                      pairs[j].T_map_body, scale);

@@ -117,6 +117,7 @@ Json to_json(const LandmarkMetrics& metrics) {
   json.set("on_sky", count_json(metrics.on_sky));
   json.set("on_moving", count_json(metrics.on_moving));
   json.set("at_outlines", count_json(metrics.at_outlines));
+  json.set("refused", count_json(metrics.refused));
   for (const DistanceBin& bin : metrics.bins) {
     Json item = Json::object();
     item.set("n", count_json(bin.count));
@@ -147,6 +148,9 @@ std::string landmarks_text(const std::string& run, const LandmarkMetrics& metric
                      " on_sky=" + std::to_string(metrics.on_sky) +
                      " on_moving=" + std::to_string(metrics.on_moving) +
                      " at_outlines=" + std::to_string(metrics.at_outlines) + "\n";
+  if (metrics.refused > 0)
+    text += run + " landmarks: refused=" + std::to_string(metrics.refused) +
+            ", expected a camera, pixel and time of the recording and finite numbers\n";
   const std::string lead = run + " landmarks:";
   text +=
       lead +

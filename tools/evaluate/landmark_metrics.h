@@ -37,6 +37,7 @@ struct FarBirths {
 
 struct LandmarkMetrics {
   std::size_t count = 0, on_sky = 0, on_moving = 0, at_outlines = 0;  // of all; the others lie on surfaces
+  std::size_t refused = 0;                                            // left out: JudgedLandmarks::refused
   std::vector<DistanceBin> bins;                                      // surfaces only
   std::vector<FarBirths> far;                                         // surfaces and outlines
 };

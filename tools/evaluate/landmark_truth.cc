@@ -49,16 +49,36 @@ double local_scale(const std::vector<PosePair>& pairs, double time_s, double fal
 SimulatedWorld::SimulatedWorld(const simulation_t& message)
     : simulation_(simulate::Simulation::request_of(message)) {}
 
-std::vector<JudgedLandmark> SimulatedWorld::judge(const landmarks_t& landmarks, std::int32_t map_id,
-                                                  const std::vector<PosePair>& pairs,
-                                                  const MapToWorld& map_to_world) {
-  // Frame by frame: drawing a frame costs more than asking about a thousand of its pixels.
+bool SimulatedWorld::is_during_recording(std::int64_t utime) const {
+  const std::int64_t frame = frame_at(simulation_, utime);
+  return utime >= 0 && frame < simulation_.frames();
+}
+
+// The messages of a damaged or foreign log hold any number.
+bool SimulatedWorld::is_of_recording(const landmark_t& l) const {
+  if (l.anchor_camera < 0 || l.anchor_camera >= simulation_.cameras()) return false;
+  const slam::Camera& camera = simulation_.camera(l.anchor_camera);
+  const auto is_within = [](float pixel, int side_px) {  // NaN: false
+    return pixel >= -0.5F && static_cast<double>(pixel) <= side_px - 0.5;
+  };
+  return is_within(l.anchor_pixel[0], camera.width_px()) &&
+         is_within(l.anchor_pixel[1], camera.height_px()) && is_during_recording(l.anchor_utime) &&
+         is_during_recording(l.created_utime) && Eigen::Map<const Eigen::Vector3d>(l.position).allFinite() &&
+         std::isfinite(l.distance) && std::isfinite(l.relative_sigma);
+}
+
+JudgedLandmarks SimulatedWorld::judge(const landmarks_t& landmarks, std::int32_t map_id,
+                                      const std::vector<PosePair>& pairs, const MapToWorld& map_to_world) {
+  JudgedLandmarks judged;
+  // Frame by frame, since drawing a frame costs more than a thousand of its pixels.
   std::map<std::pair<std::int64_t, int>, std::vector<const landmark_t*>> by_frame;
   for (const landmark_t& landmark : landmarks.landmarks) {
-    if (landmark.map_id == map_id && landmark.anchor_camera < simulation_.cameras())
+    if (landmark.map_id != map_id) continue;
+    if (is_of_recording(landmark))
       by_frame[{frame_at(simulation_, landmark.anchor_utime), landmark.anchor_camera}].push_back(&landmark);
+    else
+      ++judged.refused;
   }
-  std::vector<JudgedLandmark> all;
   for (const auto& [frame_and_camera, seen_here] : by_frame) {
     const auto& [frame, camera] = frame_and_camera;
     std::vector<Eigen::Vector2d> pixels;
@@ -66,9 +86,9 @@ std::vector<JudgedLandmark> SimulatedWorld::judge(const landmarks_t& landmarks, 
     const std::vector<simulate::SeenPoint> seen = simulation_.look(frame, camera, pixels);
     const double scale = local_scale(pairs, simulation_.frame_time_s(frame), map_to_world.scale);
     for (std::size_t i = 0; i < seen_here.size(); ++i)
-      all.push_back(judge_one(*seen_here[i], seen[i], scale, map_to_world));
+      judged.landmarks.push_back(judge_one(*seen_here[i], seen[i], scale, map_to_world));
   }
-  return all;
+  return judged;
 }
 
 JudgedLandmark SimulatedWorld::judge_one(const landmark_t& landmark, const simulate::SeenPoint& seen,

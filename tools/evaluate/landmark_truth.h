@@ -35,19 +35,25 @@ struct JudgedLandmark {
   double born_at_m = 0.0;     // true distance then
 };
 
+struct JudgedLandmarks {
+  std::vector<JudgedLandmark> landmarks;
+  std::size_t refused = 0;  // camera, pixel or time outside the recording, or a number that is not finite
+};
+
 // Keeps the world and the rays already cast.
 class SimulatedWorld {
  public:
   // Throws InputError if the message's world cannot be made again.
   explicit SimulatedWorld(const simulation_t& message);
 
-  // Every landmark of one map, in the order of the message. `truth` and `estimate` at the same point of the
+  // Judges the landmarks of one map, frame by frame. `pairs`: truth and estimate at the same point of the
   // vehicle; `map_to_world` is the run's alignment.
-  [[nodiscard]] std::vector<JudgedLandmark> judge(const landmarks_t& landmarks, std::int32_t map_id,
-                                                  const std::vector<PosePair>& pairs,
-                                                  const MapToWorld& map_to_world);
+  [[nodiscard]] JudgedLandmarks judge(const landmarks_t& landmarks, std::int32_t map_id,
+                                      const std::vector<PosePair>& pairs, const MapToWorld& map_to_world);
 
  private:
+  [[nodiscard]] bool is_of_recording(const landmark_t& landmark) const;
+  [[nodiscard]] bool is_during_recording(std::int64_t utime) const;
   [[nodiscard]] JudgedLandmark judge_one(const landmark_t& landmark, const simulate::SeenPoint& seen,
                                          double scale, const MapToWorld& map_to_world) const;
   void judge_place(const landmark_t& landmark, const MapToWorld& map_to_world, JudgedLandmark* judged) const;

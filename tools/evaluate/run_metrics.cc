@@ -118,9 +118,12 @@ void add_landmarks(const RunLog& log, const Trajectory& truth_at_point, Simulate
                    RunMetrics* metrics) {
   const std::optional<AbsoluteError>& absolute = metrics->final_metrics.absolute;
   if (!log.landmarks || !absolute || log.final_trajectory.poses.empty()) return;
-  metrics->judged = world->judge(*log.landmarks, log.final_trajectory.poses.front().map_id,
-                                 pair_nearest(truth_at_point, log.final_trajectory), absolute->map_to_world);
+  JudgedLandmarks judged =
+      world->judge(*log.landmarks, log.final_trajectory.poses.front().map_id,
+                   pair_nearest(truth_at_point, log.final_trajectory), absolute->map_to_world);
+  metrics->judged = std::move(judged.landmarks);
   metrics->landmarks = measure_landmarks(metrics->judged);
+  metrics->landmarks->refused = judged.refused;
 }
 
 // Time range of a segment: by the recording's frames where they are known, else by the estimate's own poses.

@@ -14,7 +14,8 @@ constexpr std::size_t kFewestFrames = 400;
 double median_period_ms(const std::vector<TimedFrame>& frames) {
   std::vector<double> periods_ms;
   for (std::size_t i = 1; i < frames.size(); ++i)
-    periods_ms.push_back(1e-3 * static_cast<double>(frames[i].utime - frames[i - 1].utime));
+    periods_ms.push_back(1e-3 *
+                         (static_cast<double>(frames[i].utime) - static_cast<double>(frames[i - 1].utime)));
   return percentile(std::move(periods_ms), 50.0);
 }
 

@@ -62,23 +62,23 @@ void draw_states(const RunRecord& run, double top, double left, double px_per_s,
 // A row of the time line: when one counter rose, and by how much in all.
 struct FaultLane {
   const char* name;
-  std::int64_t total = 0;
+  double total = 0.0;  // of a damaged log any number
   std::vector<double> times_s;
 };
 
 std::vector<FaultLane> fault_lanes(const RunRecord& run) {
   std::vector<FaultLane> lanes;
   for (const Fault& fault : kFaults) {
-    FaultLane lane{fault.name, 0, {}};
-    std::int64_t before = 0;
+    FaultLane lane{fault.name, 0.0, {}};
+    double before = 0.0;
     for (const status_t& status : run.statuses) {
-      const std::int64_t rise = status.*fault.count - before;
-      before = status.*fault.count;
-      if (rise <= 0) continue;
+      const double count = static_cast<double>(status.*fault.count), rise = count - before;
+      before = count;
+      if (rise <= 0.0) continue;
       lane.total += rise;
       lane.times_s.push_back(seconds_of(status.utime) - run.start_s);
     }
-    if (lane.total > 0) lanes.push_back(std::move(lane));
+    if (lane.total > 0.0) lanes.push_back(std::move(lane));
   }
   return lanes;
 }
@@ -87,7 +87,7 @@ constexpr double kStateRow_px = 24, kLane_px = 15;
 
 void draw_faults(const std::vector<FaultLane>& lanes, double top, double left, double px_per_s, Svg* svg) {
   for (const FaultLane& lane : lanes) {
-    svg->text({left - 8, top + 11}, std::to_string(lane.total) + " " + lane.name, Anchor::kEnd);
+    svg->text({left - 8, top + 11}, number(lane.total, 0) + " " + lane.name, Anchor::kEnd);
     for (const double t : lane.times_s) {
       const double x = left + px_per_s * t;
       svg->line({x, top + 1}, {x, top + 12}, "stroke=\"#000\" stroke-width=\"1.2\"");

@@ -110,7 +110,7 @@ std::string births(const Runs& runs) {
 std::vector<double> vmp_lives_s(const RunRecord& run) {
   std::vector<double> lives_s;
   for (const landmark_t& l : run.landmarks()->landmarks) {
-    if (l.through_vmp != 0) lives_s.push_back(seconds_of(l.created_utime - l.anchor_utime));
+    if (l.through_vmp != 0) lives_s.push_back(seconds_between(l.anchor_utime, l.created_utime));
   }
   return lives_s;
 }

@@ -48,10 +48,13 @@ std::string stroke(const Style& style) {
 }
 
 std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
+  // Beyond the precision of a double no step moves a value on.
+  constexpr int kMostSteps = 1000;
   std::vector<double> values;
   if (is_log) {
     const bool wide = high / low > 2e3;
-    for (double decade = std::pow(10.0, std::floor(std::log10(low))); decade <= high; decade *= 10.0) {
+    double decade = std::pow(10.0, std::floor(std::log10(low)));
+    for (int i = 0; i < kMostSteps && decade <= high; ++i, decade *= 10.0) {
       for (const double m : {1.0, 2.0, 5.0}) {
         if (wide && m > 1.0) continue;
         if (m * decade >= low * 0.999 && m * decade <= high * 1.001) values.push_back(m * decade);
@@ -64,7 +67,8 @@ std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
   for (const double m : {5.0, 2.0, 1.0}) {
     if (m * power >= raw) step = m * power;
   }
-  for (double v = std::ceil(low / step - 1e-9) * step; v <= high + 1e-9 * step; v += step)
+  double v = std::ceil(low / step - 1e-9) * step;
+  for (int i = 0; i < kMostSteps && v <= high + 1e-9 * step; ++i, v += step)
     values.push_back(std::abs(v) < 1e-9 * step ? 0.0 : v);
   return values;
 }

@@ -77,7 +77,7 @@ std::vector<Figure> figures() {
           {"time from a point's first to its last keyframe, s",
            [](const RunRecord& run) {
              return median_of_landmarks(run, [](const landmark_t& l) {
-               return seconds_of(l.sighting_utime.back() - l.sighting_utime.front());
+               return seconds_between(l.sighting_utime.front(), l.sighting_utime.back());
              });
            }},
           {"keyframes, % of the frames", keyframes_percent},

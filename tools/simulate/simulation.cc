@@ -82,11 +82,31 @@ void Simulation::make_cameras() {
   }
 }
 
+namespace {
+
+// A damaged message must not ask for a world of any size.
+void check_message(const simulation_t& message) {
+  constexpr double kLongest_s = 86'400.0;
+  constexpr int kMinSide_px = 32, kMaxSide_px = 4096;
+  if (!(message.duration > 0.0 && message.duration <= kLongest_s)) {
+    throw InputError("SIMULATION: duration " + std::to_string(message.duration) +
+                     " s, expected above 0 and at most 86400");
+  }
+  const auto is_side = [](int px) { return px >= kMinSide_px && px <= kMaxSide_px; };
+  if (!is_side(message.width) || !is_side(message.height)) {
+    throw InputError("SIMULATION: images of " + std::to_string(message.width) + " x " +
+                     std::to_string(message.height) + ", expected 32 to 4096 pixels each");
+  }
+}
+
+}  // namespace
+
 SimulationRequest Simulation::request_of(const simulation_t& message) {
   if (message.version != kSimulatorVersion) {
     throw InputError("SIMULATION: made by simulator version " + std::to_string(message.version) +
                      ", expected " + std::to_string(kSimulatorVersion) + ": its world cannot be made again");
   }
+  check_message(message);
   SimulationRequest request;
   request.world_name = message.world_name;
   request.world_text = message.world;

@@ -38,6 +38,11 @@ struct Trajectory {
   return static_cast<double>(utime) / 1e6;
 }
 
+// From one time to another; any two, since the difference of damaged ones may not fit an integer.
+[[nodiscard]] inline double seconds_between(std::int64_t from_utime, std::int64_t to_utime) {
+  return (static_cast<double>(to_utime) - static_cast<double>(from_utime)) / 1e6;
+}
+
 // Moves every pose by T_body_point: T_world_body -> T_world_point.
 void move_reference_point(const slam::SE3& T_body_point, Trajectory* trajectory);
 // Expresses the trajectory in the axes of its own first pose (which becomes the identity). Precondition: not

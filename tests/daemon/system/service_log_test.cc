@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -64,6 +66,30 @@ TEST(ServiceLog, GoesToItsFileWithTimeAndLevel) {
   text << std::ifstream(config.file).rdbuf();
   EXPECT_NE(text.str().find(" warning the camera is gone\n"), std::string::npos) << text.str();
   EXPECT_EQ(text.str().find("not of this level"), std::string::npos);
+}
+
+TEST(ServiceLog, ALineBreakInATextForgesNoLineOfTheJournal) {
+  setenv("JOURNAL_STREAM", "8:1", 1);
+  testing::internal::CaptureStderr();
+  start_service_log({});
+  spdlog::info("command: {}", "reset\n<0>the vehicle is on fire\x1b[2J");
+  spdlog::info("{}", std::string(100'000, 'x'));
+  stop_service_log();
+  unsetenv("JOURNAL_STREAM");
+  const std::string text = testing::internal::GetCapturedStderr();
+  start_logging("warning");  // for the tests that follow
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2) << text.substr(0, 1000);
+  EXPECT_TRUE(text.starts_with("<6>command: reset\\n<0>the vehicle is on fire\\x1b[2J\n<6>xxx"))
+      << text.substr(0, 1000);
+  EXPECT_LT(text.size(), 10'000U) << "a longer line is cut by the journal, and its rest read as a line";
+}
+
+TEST(ServiceLog, ALineBreakInATextForgesNoLineOfAReplaysLogEither) {
+  testing::internal::CaptureStderr();
+  start_logging("warning");
+  spdlog::warn("camera \"a\nfarpointd: error: b\"");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "farpointd: warning: camera \"a\\nfarpointd: error: b\"\n");
 }
 
 TEST(ServiceLog, AFileThatCannotBeWrittenNowMayBeOpenedLater) {

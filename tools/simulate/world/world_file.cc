@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "daemon/config/yaml_file.h"
 #include "slam/geometry/rig.h"
 #include "tools/common/errors.h"
 #include "tools/simulate/world/yaml_section.h"
@@ -302,6 +303,9 @@ void check_whole(const YamlSection& top, const WorldDescription& world) {
 
 WorldDescription parse_world(const std::string& text, const std::filesystem::path& file) {
   YAML::Node root;
+  if (text.size() > daemon::kMaxYamlBytes)
+    throw InputError(file.string() +
+                     ": longer than 1 MiB, expected a world file like config/worlds/town.yaml");
   try {
     root = YAML::Load(text);
   } catch (const YAML::Exception& e) {
