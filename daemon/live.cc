@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <deque>
 #include <optional>
 
 #include "daemon/config/build_info.h"
@@ -13,7 +14,6 @@
 #include "daemon/input/camera_driver.h"
 #include "daemon/input/camera_source.h"
 #include "daemon/input/recorder.h"
-#include "daemon/input/second_camera.h"
 #include "daemon/input/wheel_source.h"
 #include "daemon/output/outputs.h"
 #include "daemon/output/run_summary.h"
@@ -48,6 +48,10 @@ drivers::ExposureOptions exposure_options(const ExposureConfig& c) {
   o.max_gain_share = c.max_gain_share;
   o.target_grey = c.target_grey;
   return o;
+}
+
+const std::string& device_of(const CameraConfig& camera, int index) {
+  return index == 0 ? camera.device : camera.second_device;
 }
 
 calibration_t read_calibration(const Config& config) {
@@ -109,7 +113,7 @@ class LiveRun {
   [[nodiscard]] bool wants_results() const {
     return !options_.output.empty() || !options_.trajectory.empty();
   }
-  [[nodiscard]] std::unique_ptr<SecondCamera> open_second(std::unique_ptr<drivers::Camera> camera) const;
+  [[nodiscard]] std::deque<CameraSource> open_cameras(LiveEnvironment* environment) const;
   void open_recorder();
   void open_wheels();
   void run_threads(const ThreadHooks& hooks);
@@ -131,8 +135,7 @@ class LiveRun {
   std::optional<Recorder> recorder_;
   std::unique_ptr<WheelSource> wheels_;  // null: none is configured
   std::optional<ControlSocket> control_;
-  std::unique_ptr<SecondCamera> second_;  // null: none is configured
-  CameraSource source_;
+  std::deque<CameraSource> cameras_;  // the first feeds the pipeline
   std::unique_ptr<Session> session_;
   RealtimeReport realtime_;
   Pipeline pipeline_;
@@ -146,25 +149,27 @@ LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* 
       config_(config),
       calibration_(read_calibration(config)),
       outputs_(options, config, Outputs::Use::kLive),
-      second_(open_second(std::move(environment->second_camera))),
-      source_(environment->camera ? std::move(environment->camera)
-                                  : make_camera(config.camera.driver, camera_options(config, calibration_, 0),
-                                                "camera.device")),
+      cameras_(open_cameras(environment)),
       session_(open_session()),
       realtime_(config.realtime),
-      pipeline_(config, pipeline_options(), &source_, session_.get(), &outputs_) {
+      pipeline_(config, pipeline_options(), &cameras_.front(), session_.get(), &outputs_) {
   open_control();
-  if (second_) source_.pair_with(second_.get(), config.camera.pair_tolerance_us);
   if (!options.record.empty()) open_recorder();
   open_wheels();
 }
 
-std::unique_ptr<SecondCamera> LiveRun::open_second(std::unique_ptr<drivers::Camera> camera) const {
-  if (!config_.camera.has_second()) return nullptr;
-  if (!camera)
-    camera = make_camera(config_.camera.driver, camera_options(config_, calibration_, SecondCamera::kIndex),
-                         "camera.second_device");
-  return std::make_unique<SecondCamera>(std::move(camera));
+std::deque<CameraSource> LiveRun::open_cameras(LiveEnvironment* environment) const {
+  const CameraConfig& c = config_.camera;
+  std::deque<CameraSource> cameras;
+  const auto open = [&](std::unique_ptr<drivers::Camera> given, const char* key) {
+    const int index = static_cast<int>(cameras.size());
+    if (!given) given = make_camera(c.driver, camera_options(config_, calibration_, index), key);
+    cameras.emplace_back(index, std::move(given));
+    if (index > 0) cameras.front().pair_with(&cameras.back(), c.pair_tolerance_us);
+  };
+  open(std::move(environment->camera), "camera.device");
+  if (c.has_second()) open(std::move(environment->second_camera), "camera.second_device");
+  return cameras;
 }
 
 void LiveRun::open_recorder() {
@@ -173,8 +178,7 @@ void LiveRun::open_recorder() {
   } catch (const std::runtime_error& error) {
     throw UsageError(error.what());
   }
-  source_.record_to(&*recorder_);
-  if (second_) second_->record_to(&*recorder_);
+  for (CameraSource& camera : cameras_) camera.record_to(&*recorder_);
 }
 
 void LiveRun::open_wheels() {
@@ -257,11 +261,14 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
     recording.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, &realtime_,
                       [this] { recorder_->run(); });
   const StopAtEnd stop_recorder(recorder_ ? &*recorder_ : nullptr);
-  std::optional<Thread> second_capture;
-  if (second_)
-    second_capture.emplace(SecondCamera::kThread, config_.realtime, config_.realtime.capture, &realtime_,
-                           [this] { second_->run(); });
-  const StopAtEnd stop_second(second_.get());
+  std::deque<Thread> further_captures;
+  std::deque<StopAtEnd<CameraSource>> stop_further;
+  for (CameraSource& camera : cameras_) {
+    if (&camera == &cameras_.front()) continue;
+    further_captures.emplace_back(camera.thread_name().c_str(), config_.realtime, config_.realtime.capture,
+                                  &realtime_, [&camera] { camera.run(); });
+    stop_further.emplace_back(&camera);
+  }
   std::optional<Thread> wheels;
   if (wheels_)
     wheels.emplace(WheelSource::kThread, config_.realtime, ThreadConfig{}, &realtime_,
@@ -273,9 +280,9 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
 }
 
 void LiveRun::tick(const std::function<Config()>& reload) {
-  for (drivers::CameraEvent event; source_.take_event(&event);) say(event, config_.camera.device);
-  if (second_)
-    for (drivers::CameraEvent event; second_->take_event(&event);) say(event, config_.camera.second_device);
+  for (CameraSource& camera : cameras_)
+    for (drivers::CameraEvent event; camera.take_event(&event);)
+      say(event, device_of(config_.camera, camera.index()));
   if (ReloadOnSignal::take()) take_over(reload);
   if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
@@ -325,8 +332,7 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
     config_.camera.exposure = wanted.camera.exposure;
     set_log_level(config_.log.level);
     session_->reporter().set_status_rate(config_.lcm.status_rate_hz);
-    source_.set_exposure(exposure_options(config_.camera.exposure));
-    if (second_) second_->set_exposure(exposure_options(config_.camera.exposure));
+    for (CameraSource& camera : cameras_) camera.set_exposure(exposure_options(config_.camera.exposure));
     spdlog::info("configuration read again{}", restart.empty() ? "" : "; after a restart only: " + restart);
   } catch (const std::exception& error) {
     spdlog::error("configuration not taken over: {}", error.what());
@@ -354,7 +360,7 @@ drivers::CameraOptions camera_options(const Config& config, const calibration_t&
   const CameraConfig& c = config.camera;
   const camera_calibration_t& camera = calibration.cameras.at(static_cast<std::size_t>(index));
   drivers::CameraOptions o;
-  o.device = index == SecondCamera::kIndex ? c.second_device : c.device;
+  o.device = device_of(c, index);
   o.width_px = camera.width;
   o.height_px = camera.height;
   o.rate_hz = c.rate_hz;

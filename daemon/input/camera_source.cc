@@ -2,6 +2,8 @@
 #include "daemon/input/camera_source.h"
 
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "daemon/input/camera_counts.h"
 #include "daemon/system/stage_clock.h"
@@ -13,29 +15,40 @@ constexpr int kTurn_ms = 100;
 
 }  // namespace
 
-CameraSource::CameraSource(std::unique_ptr<drivers::Camera> camera) : camera_(std::move(camera)) {
+CameraSource::CameraSource(int index, std::unique_ptr<drivers::Camera> camera)
+    : index_(index), thread_name_("fp-capture-" + std::to_string(index)), camera_(std::move(camera)) {
   events_.listen_to(camera_.get());
 }
 
+bool CameraSource::grab(ipc::GreyImage* image, drivers::CameraFrame* frame) {
+  if (!camera_->next(kTurn_ms, image, frame)) return false;
+  if (recorder_ != nullptr) recorder_->offer(index_, *image, *frame);
+  return true;
+}
+
 CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImage* image) {
-  drivers::CameraFrame frame;
-  const bool came = camera_->next(kTurn_ms, &image->image, &frame);
+  const bool came = grab(&image->image, &image->meta);
   image->in = input_counts(camera_->counts());
-  if (stereo_) {
-    stereo_->note(came ? std::optional(frame.utime) : std::nullopt, std::llround(1e6 * steady_s()));
-    stereo_->add_to(&image->in);
+  for (StereoWatch& pair : pairs_) {
+    pair.note(came ? std::optional(image->meta) : std::nullopt, std::llround(1e6 * steady_s()));
+    pair.add_to(&image->in);
   }
   image->progress = -1.0;
   if (!came) return camera_->is_streaming() ? CaptureStatus::kNothing : CaptureStatus::kAway;
-  image->utime = frame.utime;
-  image->sequence = frame.sequence;
-  image->exposure_us = frame.exposure_us;
-  image->gain = frame.gain;
   // Both are CLOCK_MONOTONIC: the age of what is published counts from mid-exposure.
-  image->due_s = 1e-6 * static_cast<double>(frame.utime);
+  image->due_s = 1e-6 * static_cast<double>(image->meta.utime);
   image->decode_cpu_ms = image->decode_wall_ms = -1.0;
-  if (recorder_ != nullptr) recorder_->offer(kIndex, image->image, frame);
   return CaptureStatus::kImage;
+}
+
+void CameraSource::run() {
+  while (!stop_.load(std::memory_order_relaxed)) turn();
+}
+
+void CameraSource::turn() {
+  drivers::CameraFrame frame;
+  const bool came = grab(&image_, &frame);
+  reports_.put(came ? std::optional(frame) : std::nullopt, camera_->is_streaming(), camera_->counts());
 }
 
 }  // namespace farpoint::daemon

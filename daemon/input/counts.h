@@ -15,6 +15,7 @@ struct InputCounts {
   std::int64_t missing = 0, flagged = 0, camera_losses = 0;
   // Live with a second camera: pairs by time, and images without a partner.
   std::int64_t stereo_pairs = 0, stereo_left_alone = 0, stereo_right_alone = 0;
+  std::int64_t stereo_skew_us = 0;  // of the last pair: second camera's time minus the first's
 };
 
 // Messages and frames not sent. The bus is counted here because its sink is no message sink.

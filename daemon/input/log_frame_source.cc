@@ -55,7 +55,7 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
     const ipc::ImageStatus status = source_.decode(item, &image_);
     if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
     if (status != ipc::ImageStatus::kOk) continue;
-    *frame = {item.utime, item.image->sequence, &image_};
+    *frame = {{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &image_};
     gave_image_ = true;
     given_utime_ = item.utime;
     return true;

@@ -155,6 +155,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.stereo_pairs = in.stereo_pairs;
   s.stereo_left_alone = in.stereo_left_alone;
   s.stereo_right_alone = in.stereo_right_alone;
+  s.stereo_skew_us = in.stereo_skew_us;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
   s.messages_undecodable = in.messages_undecodable;

@@ -143,8 +143,8 @@ void Pipeline::track_one(CapturedImage* image) {
   features_.note(late);
   const slam::ImageView view{image->image.data(), image->image.width_px, image->image.height_px,
                              image->image.width_px};
-  package->result =
-      session_.estimator().track({image->utime, image->sequence, 0, view, package->chance.features_asked});
+  package->result = session_.estimator().track(
+      {image->meta.utime, image->meta.sequence, 0, view, package->chance.features_asked});
   package->counts = session_.estimator().counts();
   package->in = image->in;
   package->due_s = image->due_s;

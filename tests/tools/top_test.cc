@@ -69,12 +69,14 @@ TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
   s.stereo_pairs = 912;
   s.stereo_left_alone = 34;
   s.stereo_right_alone = 5;
+  s.stereo_skew_us = -1234;
   board.take(s, 100.2);
   const std::string text = board.render(100.3, false);
-  EXPECT_TRUE(has(text, "stereo    912 pairs   34 left alone   5 right alone\n")) << text;
+  EXPECT_TRUE(has(text, "stereo    912 pairs   34 left alone   5 right alone   skew -1.2 ms\n")) << text;
   s.stereo_pairs = s.stereo_right_alone = 0;  // it never came
   board.take(s, 100.4);
-  EXPECT_TRUE(has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone\n"));
+  EXPECT_TRUE(
+      has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone   skew -1.2 ms\n"));
 }
 
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {

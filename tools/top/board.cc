@@ -150,8 +150,9 @@ std::string Board::count_lines() const {
       s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
       s.camera_losses);
   if (s.stereo_pairs > 0 || s.stereo_left_alone > 0 || s.stereo_right_alone > 0) {
-    text += fmt::format("stereo    {} pairs   {} left alone   {} right alone\n", s.stereo_pairs,
-                        s.stereo_left_alone, s.stereo_right_alone);
+    text +=
+        fmt::format("stereo    {} pairs   {} left alone   {} right alone   skew {:.1f} ms\n", s.stereo_pairs,
+                    s.stereo_left_alone, s.stereo_right_alone, 1e-3 * static_cast<double>(s.stereo_skew_us));
   }
   text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
                       s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
