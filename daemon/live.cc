@@ -297,6 +297,9 @@ void LiveRun::tick(const std::function<Config()>& reload) {
 void LiveRun::tell_status(double now_s) {
   next_status_s_ = now_s + kStatusEvery_s;
   manager_.status(status_text());
+  for (CameraSource& camera : cameras_)
+    if (const std::string line = camera.take_troubles(now_s); !line.empty())
+      spdlog::warn("camera {}: {}", device_of(config_.camera, camera.index()), line);
   if (!recorder_ || recorder_->left_out() == left_out_said_) return;
   left_out_said_ = recorder_->left_out();
   spdlog::warn("{}: {} images left out so far: the disk cannot follow, or is full", options_.record,

@@ -21,9 +21,10 @@ CameraSource::CameraSource(int index, std::unique_ptr<drivers::Camera> camera)
 }
 
 bool CameraSource::grab(ipc::GreyImage* image, drivers::CameraFrame* frame) {
-  if (!camera_->next(kTurn_ms, image, frame)) return false;
-  if (recorder_ != nullptr) recorder_->offer(index_, *image, *frame);
-  return true;
+  const bool came = camera_->next(kTurn_ms, image, frame);
+  troubles_.note(camera_->counts());
+  if (came && recorder_ != nullptr) recorder_->offer(index_, *image, *frame);
+  return came;
 }
 
 CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImage* image) {

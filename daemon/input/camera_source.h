@@ -12,6 +12,7 @@
 
 #include "daemon/input/camera_events.h"
 #include "daemon/input/camera_reports.h"
+#include "daemon/input/camera_troubles.h"
 #include "daemon/input/capture_source.h"
 #include "daemon/input/recorder.h"
 #include "daemon/input/stereo_watch.h"
@@ -46,6 +47,9 @@ class CameraSource final : public CaptureSource {
   [[nodiscard]] int index() const { return index_; }
   // One other thread: takes the oldest new event; false without one.
   [[nodiscard]] bool take_event(drivers::CameraEvent* event) { return events_.take(event); }
+  // One other thread: a line for the log about images that were refused or whose time is doubtful; mostly
+  // empty.
+  [[nodiscard]] std::string take_troubles(double now_s) { return troubles_.take_line(now_s); }
   // Any thread.
   void set_exposure(const drivers::ExposureOptions& options) { camera_->set_exposure(options); }
 
@@ -55,6 +59,7 @@ class CameraSource final : public CaptureSource {
   const int index_;
   const std::string thread_name_;
   CameraEvents events_;
+  CameraTroubles troubles_;
   std::unique_ptr<drivers::Camera> camera_;
   Recorder* recorder_ = nullptr;
   std::vector<StereoWatch> pairs_;  // first camera: one a further camera

@@ -11,6 +11,7 @@ struct InputCounts {
   std::int64_t wrong_size = 0, undecodable = 0, unknown_camera = 0, times_backwards = 0;
   std::int64_t messages_undecodable = 0, log_damages = 0;
   std::int64_t imu_invalid = 0, wheels_invalid = 0;  // not finite, or beyond any sensor's range
+  std::int64_t times_unknown = 0;  // live: stamps of no clock; the time of arrival stands in
   // Live cameras: gaps in the driver's numbers, buffers marked as damaged, losses and stalls.
   std::int64_t missing = 0, flagged = 0, camera_losses = 0;
   // Live with a second camera: pairs by time, and images without a partner.

@@ -31,6 +31,7 @@ void StereoWatch::add_to(InputCounts* in) const {
   in->images += further.images;
   in->undecodable += further.undecodable;
   in->times_backwards += further.times_backwards;
+  in->times_unknown += further.times_unknown;
   in->missing += further.missing;
   in->flagged += further.flagged;
   in->camera_losses += further.camera_losses;

@@ -158,6 +158,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.stereo_skew_us = in.stereo_skew_us;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
+  s.times_unknown = in.times_unknown;
   s.messages_undecodable = in.messages_undecodable;
   s.log_damages = in.log_damages;
   s.imu_invalid = in.imu_invalid;

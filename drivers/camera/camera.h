@@ -63,7 +63,8 @@ struct CameraCounts {
   std::int64_t flagged = 0;          // marked as damaged by the driver
   std::int64_t undecodable = 0;      // too short, or no JPEG
   std::int64_t times_backwards = 0;  // a time not after the one before it
-  std::int64_t times_unknown = 0;    // of no known clock; the time of arrival stands in
+  std::int64_t times_unknown = 0;    // of no known clock, or of a stream whose stamps
+                                     // run backwards; the time of arrival stands in
   std::int64_t opened = 0, lost = 0, stalled = 0;
 };
 

@@ -38,6 +38,8 @@ class FilmCamera final : public drivers::Camera {
     away_from_s_ = from_s;
     away_to_s_ = to_s;
   }
+  // Each of its images has a stamp of no clock, as its driver counts it.
+  void lose_stamps() { loses_stamps_ = true; }
   // As one shutter for both: image n of the other is taken with image n of this one, but for `later_us`, and
   // what is due while it is away never comes.
   void share_shutter_with(FilmCamera* other, std::int64_t later_us) {
@@ -59,6 +61,7 @@ class FilmCamera final : public drivers::Camera {
     frame->utime = std::llround(1e6 * (shutter_ ? due_s : steady_s())) + later_us_;
     frame->sequence = shown_++;
     ++counts_.frames;
+    if (loses_stamps_) ++counts_.times_unknown;
     return true;
   }
   [[nodiscard]] bool is_streaming() const override { return streaming_; }
@@ -86,6 +89,7 @@ class FilmCamera final : public drivers::Camera {
   std::int64_t later_us_ = 0;
   double began_s_ = -1.0, away_from_s_ = 1e9, away_to_s_ = 1e9;
   int shown_ = 0;
+  bool loses_stamps_ = false;
   std::atomic<bool> streaming_{true};
   drivers::CameraCounts counts_;
 };

@@ -114,6 +114,21 @@ TEST_F(Live, ACameraThatIsAwayIsPublishedAtOnceAndAtTheStatusRate) {
   EXPECT_GT(last_seen_.result.utime, silent_.back().result.utime);
 }
 
+TEST_F(Live, StampsOfNoClockAreCountedInTheStatusAndSaidInTheLogNowAndThen) {
+  camera_->lose_stamps();
+  options_.output = scratch_.path("out.lcm");
+  config_.lcm.status_rate_hz = 100;
+  ASSERT_EQ(run([this] { return frames_ >= 45; }), 0);
+  const auto status = test::messages_of<status_t>(options_.output, ipc::kStatusChannel);
+  ASSERT_FALSE(status.empty());
+  EXPECT_GE(status.back().times_unknown, 45);
+  const std::string said = "camera /dev/video0: ";
+  const std::size_t first = printed_.find(said);
+  ASSERT_NE(first, std::string::npos) << printed_;
+  EXPECT_NE(printed_.find("images with a time stamp of no clock", first), std::string::npos) << printed_;
+  EXPECT_EQ(printed_.find(said, first + 1), std::string::npos) << printed_;  // 2 s: once
+}
+
 TEST_F(Live, WithoutACameraItIsReadyAliveAndSaysSo) {
   test::NotifySocket manager(scratch_.path("notify"), 400'000);
   camera_->leave(0.0, 1e9);
