@@ -165,6 +165,7 @@ std::deque<CameraSource> LiveRun::open_cameras(LiveEnvironment* environment) con
     const int index = static_cast<int>(cameras.size());
     if (!given) given = make_camera(c.driver, camera_options(config_, calibration_, index), key);
     cameras.emplace_back(index, std::move(given));
+    cameras.back().limit_opening(c.open_limit_s);
     if (index > 0) cameras.front().pair_with(&cameras.back(), c.pair_tolerance_us);
   };
   open(std::move(environment->camera), "camera.device");

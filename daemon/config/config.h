@@ -60,6 +60,7 @@ struct CameraConfig {
   StampPointChoice stamp = StampPointChoice::kAuto;
   int time_offset_us = 0;
   double stall_s = 1.0;        // silence after which the stream restarts
+  double open_limit_s = 30;    // of one opening or closing; longer is a hang
   double lost_after_s = 0.25;  // silence after which the state is 'no_camera'
   ExposureConfig exposure;
 

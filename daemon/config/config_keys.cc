@@ -105,6 +105,7 @@ std::vector<ConfigKey> make_keys() {
                   FIELD(camera.stamp)),
       integer("camera.time_offset_us", "us", -1000000, 1000000, FIELD(camera.time_offset_us)),
       number("camera.stall_s", "s", 0.1, 60, FIELD(camera.stall_s)),
+      number("camera.open_limit_s", "s", 1, 600, FIELD(camera.open_limit_s)),
       number("camera.lost_after_s", "s", 0.01, 10, FIELD(camera.lost_after_s)),
       enumeration("camera.exposure", {"camera", "auto", "manual"}, FIELD(camera.exposure.mode)),
       number("camera.exposure_us", "us", 1, 1e6, FIELD(camera.exposure.manual_us)),

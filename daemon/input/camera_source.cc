@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/camera_source.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -40,6 +41,27 @@ CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImag
   image->due_s = 1e-6 * static_cast<double>(image->meta.utime);
   image->decode_cpu_ms = image->decode_wall_ms = -1.0;
   return CaptureStatus::kImage;
+}
+
+// Of the running opening; 0 while none runs.
+double CameraSource::opening_s(double now_s) const {
+  const std::int64_t since_us = camera_->opening_since_us();
+  if (since_us == drivers::Camera::kNotOpening) return 0.0;
+  return std::max(now_s - 1e-6 * static_cast<double>(since_us), 1e-6);
+}
+
+bool CameraSource::is_opening() const {
+  const double opening_s = this->opening_s(steady_s());
+  return opening_s > 0.0 && opening_s < open_limit_s_;
+}
+
+std::string CameraSource::take_troubles(double now_s) {
+  constexpr double kSlow_s = 2.0;
+  const bool slow = opening_s(now_s) > kSlow_s;
+  if (slow && !std::exchange(said_opening_, true))
+    return "opening or closing it has taken " + std::to_string(std::lround(opening_s(now_s))) + " s so far";
+  if (!slow) said_opening_ = false;
+  return troubles_.take_line(now_s);
 }
 
 void CameraSource::run() {

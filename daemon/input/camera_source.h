@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,8 +33,12 @@ class CameraSource final : public CaptureSource {
   void pair_with(CameraSource* further, std::int64_t tolerance_us) {
     pairs_.emplace_back(&further->reports_, tolerance_us);
   }
+  // Call before the first image. Longest time of one opening or closing; the default is without limit.
+  void limit_opening(double limit_s) { open_limit_s_ = limit_s; }
   // First camera: an image goes on at once, whether its partners have arrived or not.
   [[nodiscard]] CaptureStatus next(const std::atomic<bool>& stop, CapturedImage* image) override;
+
+  [[nodiscard]] bool is_opening() const override;
 
   // Further camera's thread: runs until stop(), which takes effect within 0.1 s. Waits for the camera only.
   void run();
@@ -47,13 +52,14 @@ class CameraSource final : public CaptureSource {
   [[nodiscard]] int index() const { return index_; }
   // One other thread: takes the oldest new event; false without one.
   [[nodiscard]] bool take_event(drivers::CameraEvent* event) { return events_.take(event); }
-  // One other thread: a line for the log about images that were refused or whose time is doubtful; mostly
-  // empty.
-  [[nodiscard]] std::string take_troubles(double now_s) { return troubles_.take_line(now_s); }
+  // One other thread: a line for the log about a slow opening, and images that were refused or whose time is
+  // doubtful; mostly empty.
+  [[nodiscard]] std::string take_troubles(double now_s);
   // Any thread.
   void set_exposure(const drivers::ExposureOptions& options) { camera_->set_exposure(options); }
 
  private:
+  [[nodiscard]] double opening_s(double now_s) const;
   [[nodiscard]] bool grab(ipc::GreyImage* image, drivers::CameraFrame* frame);
 
   const int index_;
@@ -62,6 +68,8 @@ class CameraSource final : public CaptureSource {
   CameraTroubles troubles_;
   std::unique_ptr<drivers::Camera> camera_;
   Recorder* recorder_ = nullptr;
+  double open_limit_s_ = std::numeric_limits<double>::infinity();
+  bool said_opening_ = false;
   std::vector<StereoWatch> pairs_;  // first camera: one a further camera
   // Further camera.
   CameraReports reports_;

@@ -68,7 +68,8 @@ bool Pipeline::has_progressed() {
   const bool idle = !frames_in_work();
   const std::int64_t turns = turns_.load(std::memory_order_relaxed);
   const std::int64_t tracked = tracked_.load(std::memory_order_relaxed);
-  const bool progressed = turns != turns_seen_ && (tracked != tracked_seen_ || idle);
+  const bool captures = turns != turns_seen_ || source_.is_opening();
+  const bool progressed = captures && (tracked != tracked_seen_ || idle);
   turns_seen_ = turns;
   tracked_seen_ = tracked;
   return progressed;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A live camera: one interface for all drivers. The capture thread makes all calls except construction,
-// destruction and set_exposure(). It waits in next() only; next() makes no heap call after the first images
-// and writes no log. A listener receives what an operator needs.
+// destruction, set_exposure() and opening_since_us(). It waits in next() only; next() makes no heap call
+// after the first images and writes no log. A listener receives what an operator needs.
 #pragma once
 
 #include <cstdint>
@@ -86,6 +86,10 @@ class Camera {
   [[nodiscard]] virtual bool next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame) = 0;
   [[nodiscard]] virtual bool is_streaming() const = 0;
   [[nodiscard]] virtual const CameraCounts& counts() const = 0;
+  // Callable from any thread. CLOCK_MONOTONIC, microseconds, when the running open or close of the device
+  // began, which may block for seconds; kNotOpening while none runs.
+  [[nodiscard]] virtual std::int64_t opening_since_us() const { return kNotOpening; }
+  static constexpr std::int64_t kNotOpening = -1;
   // Sets the listener, before the first next(). The capture thread calls it; it must not block.
   virtual void on_event(std::function<void(const CameraEvent&)> listener) = 0;
   // Callable from any thread at any time; takes effect with the next image.

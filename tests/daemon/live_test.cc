@@ -144,6 +144,41 @@ TEST_F(Live, WithoutACameraItIsReadyAliveAndSaysSo) {
   EXPECT_GE(manager.count("WATCHDOG=1"), 5);
 }
 
+TEST_F(Live, ACameraThatTakesLongToOpenIsNoHang) {
+  test::NotifySocket manager(scratch_.path("notify"), 400'000);
+  camera_->open_slowly(2.5);
+  const double began_s = steady_s();
+  hooks_.on_watch = [&] { manager.read_all(); };
+  EXPECT_EQ(run([this] { return frames_ >= 10; }), 0);
+  manager.read_all();
+  int meanwhile = 0;
+  for (const auto& [time_s, text] : manager.messages)
+    meanwhile += text.starts_with("WATCHDOG=1") && time_s > began_s + 0.5 && time_s < began_s + 2.4 ? 1 : 0;
+  EXPECT_GE(meanwhile, 10);
+  EXPECT_GE(silent_.size(), 5U);  // meanwhile: no camera
+  EXPECT_NE(printed_.find("camera /dev/video0: opening or closing it has taken"), std::string::npos)
+      << printed_;
+}
+
+TEST_F(Live, ACameraThatOpensForLongerThanItsLimitIsAHang) {
+  test::NotifySocket manager(scratch_.path("notify"), 400'000);
+  config_.camera.open_limit_s = 1.0;
+  camera_->open_slowly(2.5);
+  const double began_s = steady_s();
+  hooks_.on_watch = [&] { manager.read_all(); };
+  EXPECT_EQ(run([this] { return frames_ >= 10; }), 0);
+  int meanwhile = 0, after = 0;
+  for (const auto& [time_s, text] : manager.messages) {
+    if (!text.starts_with("WATCHDOG=1")) continue;
+    if (time_s > began_s + 2.6)
+      ++after;
+    else if (time_s > began_s + 1.6)
+      ++meanwhile;
+  }
+  EXPECT_EQ(meanwhile, 0);
+  EXPECT_GE(after, 1);
+}
+
 TEST_F(Live, AHungTrackerIsNotCalledAlive) {
   test::NotifySocket manager(scratch_.path("notify"), 400'000);
   std::atomic<double> hung_from_s{0.0}, hung_to_s{0.0};

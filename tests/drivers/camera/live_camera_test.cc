@@ -386,6 +386,32 @@ TEST_P(LiveCameraTest, ACameraThatStopsWithoutAnErrorIsStartedAnew) {
   EXPECT_EQ(kinds(), (std::vector{Kind::kStreaming, Kind::kStalled, Kind::kStreaming}));
 }
 
+TEST_P(LiveCameraTest, OpeningAndClosingShowWhenTheyBeganWhileTheyLast) {
+  make();
+  std::vector<std::int64_t> opening, closing;
+  std::int64_t opened_us = 0, closed_us = 0;
+  fake_->on_open = [&] {
+    opened_us = fake_->now.monotonic_us;
+    fake_->pass(3'000'000);
+    opening.push_back(camera_->opening_since_us());
+  };
+  fake_->on_close = [&] {
+    closed_us = fake_->now.monotonic_us;
+    fake_->pass(3'000'000);
+    closing.push_back(camera_->opening_since_us());
+  };
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  EXPECT_FALSE(next());
+  ASSERT_TRUE(camera_->is_streaming());
+  EXPECT_EQ(opening, std::vector{opened_us});
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  fake_->fail_stream();
+  EXPECT_FALSE(next());
+  EXPECT_EQ(closing, std::vector{closed_us});
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  fake_->on_close = nullptr;  // the fixture's end closes too
+}
+
 // ---- exposure
 
 TEST_P(LiveCameraTest, ManualExposureAndGainAreSetBeforeTheFirstImage) {
