@@ -59,6 +59,12 @@ calibration_t read_calibration(const Config& config) {
     throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
                       ", expected 0 for a live camera");
   const CameraConfig& camera = config.camera;
+  if (camera.calibration == "log") {
+    if (camera.driver != CameraDriverChoice::kFile)
+      throw ConfigError(
+          "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
+    return calibration_of_log(camera.device);
+  }
   if (camera.has_second()) return read_stereo_calibration(camera.calibration, camera.second_calibration);
   return calibration_of(read_camera_file(camera.calibration), "camera");
 }
@@ -175,7 +181,7 @@ std::deque<CameraSource> LiveRun::open_cameras(LiveEnvironment* environment) con
 
 void LiveRun::open_recorder() {
   try {
-    recorder_.emplace(options_.record, calibration_);
+    recorder_.emplace(options_.record, config_.record, calibration_);
   } catch (const std::runtime_error& error) {
     throw UsageError(error.what());
   }
@@ -346,15 +352,26 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
 
 int LiveRun::conclude() {
   const RunEnd& end = wants_results() ? session_->finish(InputCounts{}) : session_->end();
-  std::vector<std::string> written = outputs_.close(end);
+  std::vector<std::string> written;
+  std::string failure;
+  // Each by itself: one full disk does not cost the files on others.
+  const auto attempt = [&failure](const auto& part) {
+    try {
+      part();
+    } catch (const std::runtime_error& error) {
+      failure += (failure.empty() ? "" : "; ") + std::string(error.what());
+    }
+  };
+  attempt([&] { written = outputs_.close(end); });
   if (recorder_) {
-    recorder_->close();
-    written.push_back(options_.record);
+    attempt([&] { recorder_->close(); });
+    for (std::string& path : recorder_->files()) written.push_back(std::move(path));
   }
   std::fprintf(
       line_stream(options_), "%s\n",
       last_line(end, InputCounts{}, pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
           .c_str());
+  if (!failure.empty()) throw std::runtime_error(failure);
   return 0;
 }
 
@@ -365,6 +382,7 @@ drivers::CameraOptions camera_options(const Config& config, const calibration_t&
   const camera_calibration_t& camera = calibration.cameras.at(static_cast<std::size_t>(index));
   drivers::CameraOptions o;
   o.device = device_of(c, index);
+  o.index = index;
   o.width_px = camera.width;
   o.height_px = camera.height;
   o.rate_hz = c.rate_hz;

@@ -31,7 +31,14 @@ struct ControlConfig {
   std::string socket = "/run/farpoint/control";
 };
 
-enum class CameraDriverChoice { kV4l2, kLibcamera };
+// --record; 0: no limit.
+struct RecordConfig {
+  int max_size_mb = 0;
+  double max_minutes = 0;
+  double min_free_share = 0;  // of the disk
+};
+
+enum class CameraDriverChoice { kV4l2, kLibcamera, kFile, kLcm };
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
@@ -123,6 +130,7 @@ struct Config {
   LogConfig log;
   ControlConfig control;
   StateConfig state;
+  RecordConfig record;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;

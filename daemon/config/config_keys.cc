@@ -91,8 +91,12 @@ std::vector<ConfigKey> make_keys() {
 
       text("state.folder", FIELD(state.folder)),
 
+      integer("record.max_size_mb", "MB", 0, 100000000, FIELD(record.max_size_mb)),
+      number("record.max_minutes", "min", 0, 1000000, FIELD(record.max_minutes)),
+      number("record.min_free_share", "", 0, 0.9, FIELD(record.min_free_share)),
+
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
-      enumeration("camera.driver", {"v4l2", "libcamera"}, FIELD(camera.driver)),
+      enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
       text("camera.second_device", FIELD(camera.second_device)),

@@ -24,13 +24,16 @@ CameraSource::CameraSource(int index, std::unique_ptr<drivers::Camera> camera)
 bool CameraSource::grab(ipc::GreyImage* image, drivers::CameraFrame* frame) {
   const bool came = camera_->next(kTurn_ms, image, frame);
   troubles_.note(camera_->counts());
-  if (came && recorder_ != nullptr) recorder_->offer(index_, *image, *frame);
+  Recorder* recorder = recorder_.load(std::memory_order_acquire);
+  if (came && recorder != nullptr) recorder->offer(index_, *image, *frame);
   return came;
 }
 
 CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImage* image) {
   const bool came = grab(&image->image, &image->meta);
   image->in = input_counts(camera_->counts());
+  if (const Recorder* recorder = recorder_.load(std::memory_order_acquire))
+    image->in.not_recorded = recorder->left_out();
   for (StereoWatch& pair : pairs_) {
     pair.note(came ? std::optional(image->meta) : std::nullopt, std::llround(1e6 * steady_s()));
     pair.add_to(&image->in);

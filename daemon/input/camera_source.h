@@ -25,8 +25,8 @@ class CameraSource final : public CaptureSource {
  public:
   // index: of the calibration's cameras; 0 is the first.
   CameraSource(int index, std::unique_ptr<drivers::Camera> camera);
-  // Call before the first image. The recorder outlives this object.
-  void record_to(Recorder* recorder) { recorder_ = recorder; }
+  // One other thread, once, at any time. The recorder outlives this object.
+  void record_to(Recorder* recorder) { recorder_.store(recorder, std::memory_order_release); }
 
   // First camera, before the first image: pairs its images with those of `further`, which outlives this
   // object.
@@ -67,7 +67,7 @@ class CameraSource final : public CaptureSource {
   CameraEvents events_;
   CameraTroubles troubles_;
   std::unique_ptr<drivers::Camera> camera_;
-  Recorder* recorder_ = nullptr;
+  std::atomic<Recorder*> recorder_{nullptr};
   double open_limit_s_ = std::numeric_limits<double>::infinity();
   bool said_opening_ = false;
   std::vector<StereoWatch> pairs_;  // first camera: one a further camera

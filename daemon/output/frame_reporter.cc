@@ -174,6 +174,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.can_received = out.can_received;
   s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
+  s.images_not_recorded = in.not_recorded;
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors());
   s.maps = static_cast<std::int32_t>(counts.maps);
   s.keyframes = static_cast<std::int32_t>(counts.keyframes);

@@ -38,6 +38,7 @@ enum class StampPoint : std::uint8_t {
 
 struct CameraOptions {
   std::string device = "/dev/video0";  // see camera_path.h
+  int index = 0;                       // of the calibration's cameras: N of CAMERA_N
   int width_px = 0, height_px = 0;     // of the calibration; the camera must deliver this size
   double rate_hz = 0;                  // 0: the camera's own
   CameraFormat format = CameraFormat::kAuto;

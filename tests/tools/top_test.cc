@@ -16,6 +16,7 @@ status_t status_of(int state) {
   s.frames_received = 1234;
   s.images_flagged = 5;
   s.times_unknown = 17;
+  s.images_not_recorded = 23;
   s.can_state = status_t::CAN_BUS_OFF;
   s.memory_pool_bytes = 101'000'000;
   s.build = "0.1.0 abc";
@@ -54,7 +55,7 @@ TEST(Top, ShowsStateRatesAndHealth) {
        {"TRACKING   quality 87", "odometry 30.0 Hz   status 5.0 Hz", "x 12.34",
         "heading 90.0 deg   speed 5.00 units/s", "p50 30.0  p99 59.0  max 60.0 ms",
         "p50 7.0  p99 7.0  max 7.0 ms", "1234 images", "5 flagged", "17 stamps of no clock",
-        "CAN       bus off", "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
+        "23 not recorded", "CAN       bus off", "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
     EXPECT_TRUE(has(text, part)) << part << "\n" << text;
   }
   std::istringstream lines(text);

@@ -160,8 +160,9 @@ std::string Board::count_lines() const {
                       s.vmps);
   text += fmt::format("CAN       {}   {} not sent   {} bus-offs   {} received\n", can_state_name(s.can_state),
                       s.can_send_errors, s.can_bus_offs, s.can_received);
-  text += fmt::format("errors    {} LCM   {} log   {} times backwards   {} stamps of no clock\n",
-                      s.lcm_send_errors, s.log_write_errors, s.times_backwards, s.times_unknown);
+  text += fmt::format(
+      "errors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
+      s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);
   if (timing_) {
     text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
                         static_cast<double>(timing_->resident_bytes) / kMegabyte,

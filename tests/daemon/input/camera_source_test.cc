@@ -86,7 +86,7 @@ TEST(CameraSource, EveryImageOfAFurtherCameraIsReportedAndRecordedOnceWhileTheFi
   CameraSource first(0, std::make_unique<FollowingCamera>(fast));
   CameraSource further(1, std::move(owned));
   first.pair_with(&further, kPeriod_us / 4);
-  Recorder recorder(log, two_small_cameras());
+  Recorder recorder(log, {}, two_small_cameras());
   first.record_to(&recorder);
   further.record_to(&recorder);
   std::thread recording([&] { recorder.run(); });

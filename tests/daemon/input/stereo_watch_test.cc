@@ -236,7 +236,7 @@ TEST(RecorderOfTwoCameras, EachHasItsChannelAndSizeAndOlderImagesComeFirst) {
   calibration.cameras[1].width = 4;
   calibration.cameras[0].height = calibration.cameras[1].height = 2;
   {
-    Recorder recorder(path, calibration);
+    Recorder recorder(path, {}, calibration);
     const ipc::GreyImage left{6, 2, std::vector<std::uint8_t>(12, 1)};
     const ipc::GreyImage right{4, 2, std::vector<std::uint8_t>(8, 2)};
     recorder.offer(1, right, {.utime = 150, .sequence = 8, .exposure_us = 42, .gain = 3.0F});
