@@ -38,7 +38,7 @@ TEST_F(Live, StopsInOrderWithinASecond) {
 
 TEST_F(Live, FramesPastTheirDeadlineAreMarkedAndCounted) {
   options_.output = scratch_.path("out.lcm");
-  config_.realtime.deadline_ms = 0.001;  // nobody keeps that
+  config_.realtime.deadline_ms = 0.001;  // no frame keeps it
   config_.lcm.status_rate_hz = 100;      // with every frame
   ASSERT_EQ(run([this] { return frames_ >= 10; }), 0);
   const auto timing = test::messages_of<timing_t>(options_.output, ipc::kTimingChannel);
