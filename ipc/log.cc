@@ -186,10 +186,11 @@ std::string LogWriter::keep_incomplete() {
 void LogWriter::close() {
   if (!file_) return;
   if (const int error = file_->sync(); error != 0 && error_.empty()) error_ = std::strerror(error);
-  file_->close();
-  if (!error_.empty()) throw std::runtime_error("cannot write log " + path_.target() + ": " + error_);
   file_.reset();
-  path_.commit();
+  if (error_.empty()) return path_.commit();
+  const std::string kept = path_.keep_as(".incomplete");
+  throw std::runtime_error("cannot write log " + path_.target() + ": " + error_ +
+                           (kept.empty() ? "" : "; what was written is kept as " + kept));
 }
 
 }  // namespace farpoint::ipc

@@ -95,7 +95,7 @@ class LogWriter {
   }
 
   // Flushes and renames the file to its target. Throws std::runtime_error if anything was not stored (disk
-  // full); the target is then unchanged.
+  // full); the target is then unchanged, and what was written is kept as <target>.incomplete.
   void close();
 
   // Ends an incomplete log and keeps it as <target>.incomplete; the target stays unchanged. Returns the kept

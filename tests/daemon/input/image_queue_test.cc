@@ -39,7 +39,7 @@ TEST(ImageQueue, TheImageBeingTrackedIsNotTouched) {
   push(&queue, 1);
   const CapturedImage* tracked = queue.pop();
   for (std::int64_t utime = 2; utime <= 20; ++utime) push(&queue, utime);
-  EXPECT_EQ(tracked->utime, 1);
+  EXPECT_EQ(tracked->meta.utime, 1);
   EXPECT_EQ(tracked->image.pixels[0], 1);
   EXPECT_EQ(queue.dropped(), 18);
 }
