@@ -95,7 +95,8 @@ bool Recording::write(std::string_view channel, std::int64_t utime, std::span<co
   if (closed_ || steady_s() < next_try_s_) return false;
   const std::uint64_t bytes = ipc::EventFile::event_bytes(channel, data);
   if (present_ && is_full(bytes, utime)) finish_file();
-  if (is_ring_ && !make_room(bytes)) return fail("less of the disk is free than record.min_free_share");
+  if (is_ring_ && !make_room(bytes, utime))
+    return fail("less of the disk is free than record.min_free_share");
   try {
     if (!present_) begin_file();
   } catch (const std::runtime_error& error) {
@@ -129,10 +130,10 @@ bool Recording::is_full(std::uint64_t more_bytes, std::int64_t utime) const {
 
 // --- the ring
 
-bool Recording::make_room(std::uint64_t more_bytes) {
+bool Recording::make_room(std::uint64_t more_bytes, std::int64_t utime) {
   const auto is_beyond_limit = [&] {
     std::uint64_t bytes = more_bytes + (present_ ? present_->events.bytes() : 0);
-    double duration_us = present_ ? static_cast<double>(present_->duration_us()) : 0.0;
+    double duration_us = present_ ? static_cast<double>(present_->duration_us(utime)) : 0.0;
     for (const Finished& file : finished_) {
       bytes += file.bytes;
       duration_us += static_cast<double>(file.duration_us);
@@ -166,7 +167,7 @@ void Recording::finish_file() {
   file->events.close();
   try {
     file->path.commit();
-    finished_.push_back({file->path.target(), bytes, file->duration_us(), true, true});
+    finished_.push_back({file->path.target(), bytes, file->duration_us(file->last_utime), true, true});
   } catch (const std::runtime_error& error) {
     file->path.leave();
     (void)fail(error.what());

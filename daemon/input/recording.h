@@ -67,13 +67,15 @@ class Recording {
     std::optional<std::int64_t> first_utime;
     std::int64_t last_utime = 0;
 
-    [[nodiscard]] std::int64_t duration_us() const { return first_utime ? last_utime - *first_utime : 0; }
+    [[nodiscard]] std::int64_t duration_us(std::int64_t until) const {
+      return first_utime ? until - *first_utime : 0;
+    }
   };
 
   void begin_file();
   void finish_file();
   [[nodiscard]] bool is_full(std::uint64_t more_bytes, std::int64_t utime) const;
-  [[nodiscard]] bool make_room(std::uint64_t more_bytes);
+  [[nodiscard]] bool make_room(std::uint64_t more_bytes, std::int64_t utime);
   bool remove_oldest();
   bool measure_one();
   bool finish_one_part();

@@ -256,7 +256,7 @@ int FakeV4l2::System::dequeue(v4l2_buffer* buffer) {
   buffer->bytesused = static_cast<std::uint32_t>(image.filled.bytes);
   buffer->sequence = image.sequence;
   buffer->flags = image.flags;
-  buffer->timestamp.tv_sec = stamp_s.value_or(image.stamp_us / 1'000'000);
+  buffer->timestamp.tv_sec = camera_->stamp_s.value_or(image.stamp_us / 1'000'000);
   buffer->timestamp.tv_usec = image.stamp_us % 1'000'000;
   return 0;
 }
