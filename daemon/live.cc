@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <deque>
 #include <optional>
 
 #include "daemon/config/build_info.h"
@@ -14,7 +15,6 @@
 #include "daemon/input/camera_driver.h"
 #include "daemon/input/camera_source.h"
 #include "daemon/input/recorder.h"
-#include "daemon/input/second_camera.h"
 #include "daemon/input/wheel_source.h"
 #include "daemon/output/outputs.h"
 #include "daemon/output/run_summary.h"
@@ -55,12 +55,20 @@ drivers::ExposureOptions exposure_options(const ExposureConfig& c) {
   return o;
 }
 
+const std::string& device_of(const CameraConfig& camera, int index) {
+  return index == 0 ? camera.device : camera.second_device;
+}
+
 calibration_t read_calibration(const Config& config) {
   if (config.camera.index != 0)
     throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
                       ", expected 0 for a live camera");
   const CameraConfig& camera = config.camera;
-  calibration_t calibration = camera.has_second()
+  if (camera.calibration == "log" && camera.driver != CameraDriverChoice::kFile)
+    throw ConfigError(
+        "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
+  calibration_t calibration = camera.calibration == "log" ? calibration_of_log(camera.device)
+                              : camera.has_second()
                                   ? read_stereo_calibration(camera.calibration, camera.second_calibration)
                                   : calibration_of(read_camera_file(camera.calibration), "camera");
   check_image_size(calibration, config);
@@ -120,7 +128,7 @@ class LiveRun {
   [[nodiscard]] bool wants_results() const {
     return !options_.output.empty() || !options_.trajectory.empty();
   }
-  [[nodiscard]] std::unique_ptr<SecondCamera> open_second(std::unique_ptr<drivers::Camera> camera) const;
+  [[nodiscard]] std::deque<CameraSource> open_cameras(LiveEnvironment* environment) const;
   void open_log_file_aside();
   void open_recorder_aside();
   void open_wheels();
@@ -146,8 +154,7 @@ class LiveRun {
   std::optional<Thread> recording_;
   std::unique_ptr<WheelSource> wheels_;  // null: none is configured
   std::optional<ControlSocket> control_;
-  std::unique_ptr<SecondCamera> second_;  // null: none is configured
-  CameraSource source_;
+  std::deque<CameraSource> cameras_;  // the first feeds the pipeline
   std::unique_ptr<Session> session_;
   RealtimeReport realtime_;
   Pipeline pipeline_;
@@ -165,25 +172,28 @@ LiveRun::LiveRun(const Options& options, const Config& config, LiveEnvironment* 
       config_(config),
       calibration_(read_calibration(config)),
       outputs_(options, config, &side_),
-      second_(open_second(std::move(environment->second_camera))),
-      source_(environment->camera ? std::move(environment->camera)
-                                  : make_camera(config.camera.driver, camera_options(config, calibration_, 0),
-                                                "camera.device")),
+      cameras_(open_cameras(environment)),
       session_(open_session()),
       realtime_(config.realtime),
       pipeline_(config, pipeline_options(), pipeline_parts()) {
   open_log_file_aside();
   open_control();
-  if (second_) source_.pair_with(second_.get(), config.camera.pair_tolerance_us);
   open_wheels();
 }
 
-std::unique_ptr<SecondCamera> LiveRun::open_second(std::unique_ptr<drivers::Camera> camera) const {
-  if (!config_.camera.has_second()) return nullptr;
-  if (!camera)
-    camera = make_camera(config_.camera.driver, camera_options(config_, calibration_, SecondCamera::kIndex),
-                         "camera.second_device");
-  return std::make_unique<SecondCamera>(std::move(camera));
+std::deque<CameraSource> LiveRun::open_cameras(LiveEnvironment* environment) const {
+  const CameraConfig& c = config_.camera;
+  std::deque<CameraSource> cameras;
+  const auto open = [&](std::unique_ptr<drivers::Camera> given, const char* key) {
+    const int index = static_cast<int>(cameras.size());
+    if (!given) given = make_camera(c.driver, camera_options(config_, calibration_, index), key);
+    cameras.emplace_back(index, std::move(given));
+    cameras.back().limit_opening(c.open_limit_s);
+    if (index > 0) cameras.front().pair_with(&cameras.back(), c.pair_tolerance_us);
+  };
+  open(std::move(environment->camera), "camera.device");
+  if (c.has_second()) open(std::move(environment->second_camera), "camera.second_device");
+  return cameras;
 }
 
 void LiveRun::open_log_file_aside() {
@@ -194,12 +204,11 @@ void LiveRun::open_log_file_aside() {
 void LiveRun::open_recorder_aside() {
   if (options_.record.empty()) return;
   side_.begin(SideFunction::kRecording, "--record", [this] {
-    recorder_.set(std::make_unique<Recorder>(options_.record, calibration_));
+    recorder_.set(std::make_unique<Recorder>(options_.record, config_.record, calibration_));
     Recorder* recorder = recorder_.get();
     recording_.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, nullptr,
                        [recorder] { recorder->run(); });
-    source_.record_to(recorder);
-    if (second_) second_->record_to(recorder);
+    for (CameraSource& camera : cameras_) camera.record_to(recorder);
   });
 }
 
@@ -263,7 +272,8 @@ PipelineOptions LiveRun::pipeline_options() const {
 }
 
 PipelineParts LiveRun::pipeline_parts() {
-  return {&source_, &session_->estimator(), &session_->reporter(), &outputs_, &session_->tally(), &realtime_};
+  return {&cameras_.front(), &session_->estimator(), &session_->reporter(),
+          &outputs_,         &session_->tally(),     &realtime_};
 }
 
 int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks) {
@@ -288,12 +298,15 @@ int LiveRun::run(const std::function<Config()>& reload, const ThreadHooks& hooks
 void LiveRun::run_threads(const ThreadHooks& hooks) {
   // Each of these threads must stop before it is joined; the recorder's after all that record.
   const StopAtEnd stop_recording(this);
-  std::optional<Thread> second_capture;
-  if (second_)
-    second_capture.emplace(SecondCamera::kThread, config_.realtime,
-                           resolved(config_.realtime, usable_cores()).capture, &realtime_,
-                           [this] { second_->run(); });
-  const StopAtEnd stop_second(second_.get());
+  const ThreadConfig further = resolved(config_.realtime, usable_cores()).capture;
+  std::deque<Thread> further_captures;
+  std::deque<StopAtEnd<CameraSource>> stop_further;
+  for (CameraSource& camera : cameras_) {
+    if (&camera == &cameras_.front()) continue;
+    further_captures.emplace_back(camera.thread_name().c_str(), config_.realtime, further, &realtime_,
+                                  [&camera] { camera.run(); });
+    stop_further.emplace_back(&camera);
+  }
   std::optional<Thread> wheels;
   if (wheels_)
     wheels.emplace(WheelSource::kThread, config_.realtime, ThreadConfig{}, &realtime_,
@@ -309,9 +322,9 @@ void LiveRun::run_threads(const ThreadHooks& hooks) {
 }
 
 void LiveRun::tick(const std::function<Config()>& reload) {
-  for (drivers::CameraEvent event; source_.take_event(&event);) say(event, config_.camera.device);
-  if (second_)
-    for (drivers::CameraEvent event; second_->take_event(&event);) say(event, config_.camera.second_device);
+  for (CameraSource& camera : cameras_)
+    for (drivers::CameraEvent event; camera.take_event(&event);)
+      say(event, device_of(config_.camera, camera.index()));
   if (ReloadOnSignal::take()) take_over(reload);
   if (control_) control_->serve([this](const std::string& command) { return obey(command); });
   const double now_s = steady_s();
@@ -336,6 +349,9 @@ bool LiveRun::all_threads_alive(double now_s) {
 void LiveRun::tell_status(double now_s) {
   next_status_s_ = now_s + kStatusEvery_s;
   manager_.status(status_text());
+  for (CameraSource& camera : cameras_)
+    if (const std::string line = camera.take_troubles(now_s); !line.empty())
+      spdlog::warn("camera {}: {}", device_of(config_.camera, camera.index()), line);
   const Recorder* recorder = recorder_.get();
   if (recorder == nullptr || recorder->left_out() == logged_.left_out) return;
   logged_.left_out = recorder->left_out();
@@ -372,8 +388,7 @@ void LiveRun::take_over(const std::function<Config()>& reload) {
     config_.camera.exposure = wanted.camera.exposure;
     set_log_level(config_.log.level);
     session_->reporter().set_status_rate(config_.lcm.status_rate_hz);
-    source_.set_exposure(exposure_options(config_.camera.exposure));
-    if (second_) second_->set_exposure(exposure_options(config_.camera.exposure));
+    for (CameraSource& camera : cameras_) camera.set_exposure(exposure_options(config_.camera.exposure));
     spdlog::info("configuration read again{}", restart.empty() ? "" : "; after a restart only: " + restart);
   } catch (const std::exception& error) {
     spdlog::error("configuration not taken over: {}", error.what());
@@ -396,10 +411,10 @@ int LiveRun::conclude() {
   std::vector<std::string> written;
   close([&] { outputs_.close(end, &written); });
   close([&] {
-    if (recorder_.get() == nullptr) return;
-    recorder_.get()->close();
-    written.push_back(options_.record);
+    if (recorder_.get() != nullptr) recorder_.get()->close();
   });
+  if (recorder_.get() != nullptr)
+    for (std::string& path : recorder_.get()->files()) written.push_back(std::move(path));
   std::fprintf(
       line_stream(options_), "%s\n",
       last_line(end, pipeline_.input(), pipeline_.frames_dropped(), pipeline_.take_tracking_cpu_ms(), written)
@@ -414,7 +429,8 @@ drivers::CameraOptions camera_options(const Config& config, const calibration_t&
   const CameraConfig& c = config.camera;
   const camera_calibration_t& camera = calibration.cameras.at(static_cast<std::size_t>(index));
   drivers::CameraOptions o;
-  o.device = index == SecondCamera::kIndex ? c.second_device : c.device;
+  o.device = device_of(c, index);
+  o.index = index;
   o.width_px = camera.width;
   o.height_px = camera.height;
   o.rate_hz = c.rate_hz;

@@ -87,12 +87,12 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
       source.feed_to(&feed.emplace(&session->estimator()));
     }
     const RecordedChance* recorded = nullptr;
-    if (schedule != nullptr && (recorded = schedule->take(frame.utime)) == nullptr) {
+    if (schedule != nullptr && (recorded = schedule->take(frame.meta.utime)) == nullptr) {
       ++frames_dropped;  // as it was then
       clock.new_frame();
       continue;
     }
-    const FrameOutput& output = session->process({frame.utime, frame.sequence, 0, frame.view()},
+    const FrameOutput& output = session->process({frame.meta.utime, frame.meta.sequence, 0, frame.view()},
                                                  source.counts(), outputs.counts(), recorded, &clock);
     if (schedule != nullptr) schedule->check(output.result);
     cpu_ms.push_back(clock.cpu_ms(timing_t::STAGE_FRAME));

@@ -176,55 +176,34 @@ bool LogReader::next(LogEvent* event) {
   return false;
 }
 
-LogWriter::LogWriter(const std::string& path)
-    : path_(path), log_(lcm_eventlog_create(path_.writable().c_str(), "w")) {
-  if (log_ == nullptr)
-    throw std::runtime_error("cannot write log " + path_.target() + ": " + std::strerror(errno));
-  channel_.reserve(LogReader::kMaxChannelBytes);
-}
-
-LogWriter::~LogWriter() {
-  if (log_ != nullptr) lcm_eventlog_destroy(log_);
+LogWriter::LogWriter(const std::string& path) : path_(path) {
+  try {
+    file_.emplace(path_.writable());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error("cannot write log " + path_.target() + ": " + error.what());
+  }
 }
 
 bool LogWriter::write(std::string_view channel, std::int64_t timestamp_us,
                       std::span<const std::uint8_t> data) {
-  if (!error_.empty() || log_ == nullptr) return false;
-  channel_ = channel;
-  lcm_eventlog_event_t event{};
-  event.timestamp = timestamp_us;
-  event.channellen = static_cast<std::int32_t>(channel_.size());
-  event.datalen = static_cast<std::int32_t>(data.size());
-  event.channel = channel_.data();
-  // LCM's API is not const; it only reads.
-  event.data = const_cast<std::uint8_t*>(data.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
-  if (lcm_eventlog_write_event(log_, &event) != 0) {
-    error_ = std::strerror(errno);
-    return false;
-  }
-  ++events_;
-  return true;
-}
-
-bool LogWriter::flush() {
-  if (!error_.empty() || log_ == nullptr) return false;
-  if (std::fflush(log_->f) != 0) error_ = std::strerror(errno);
+  if (!error_.empty() || !file_) return false;
+  if (const int error = file_->append(channel, timestamp_us, data); error != 0) error_ = std::strerror(error);
   return error_.empty();
 }
 
 std::string LogWriter::keep_incomplete() {
-  if (log_ != nullptr) lcm_eventlog_destroy(log_);
-  log_ = nullptr;
+  file_.reset();
   return path_.keep_as(".incomplete");
 }
 
 void LogWriter::close() {
-  if (log_ == nullptr) return;
-  if (error_.empty()) error_ = flush_to_disk(log_->f);
-  lcm_eventlog_destroy(log_);
-  log_ = nullptr;
-  if (!error_.empty()) throw std::runtime_error("cannot write log " + path_.target() + ": " + error_);
-  path_.commit();
+  if (!file_) return;
+  if (const int error = file_->sync(); error != 0 && error_.empty()) error_ = std::strerror(error);
+  file_.reset();
+  if (error_.empty()) return path_.commit();
+  const std::string kept = path_.keep_as(".incomplete");
+  throw std::runtime_error("cannot write log " + path_.target() + ": " + error_ +
+                           (kept.empty() ? "" : "; what was written is kept as " + kept));
 }
 
 }  // namespace farpoint::ipc

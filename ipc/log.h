@@ -3,18 +3,17 @@
 //
 // Event format (LCM's, big-endian): sync word 0xEDA1DA01, event number (8 bytes), receive time in us (8),
 // length of the channel name (4), length of the data (4), name, data. The reader is Farpoint's, since LCM's
-// asserts on damaged lengths and cannot read a pipe; a test shows that both agree on an intact log. Writing
-// uses LCM's.
+// asserts on damaged lengths and cannot read a pipe; a test shows that both agree on an intact log.
 #pragma once
 
-#include <lcm/eventlog.h>
-
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "ipc/event_file.h"
 #include "ipc/message.h"
 #include "ipc/output_file.h"
 
@@ -86,13 +85,9 @@ class LogReader {
 
 class LogWriter {
  public:
-  // "-" is standard output. Throws std::runtime_error naming a file that cannot be written.
+  // "-" is standard output. Throws std::runtime_error naming a file that cannot be written. Without close()
+  // no file remains.
   explicit LogWriter(const std::string& path);
-  // Without close() no file remains.
-  ~LogWriter();
-  LogWriter(const LogWriter&) = delete;
-  LogWriter& operator=(const LogWriter&) = delete;
-
   // Appends one event. Returns false if it was not stored; error() holds the reason, and close() throws.
   bool write(std::string_view channel, std::int64_t timestamp_us, std::span<const std::uint8_t> data);
   // Appends an LCM message. Precondition: its vectors have the lengths of its counts.
@@ -103,24 +98,21 @@ class LogWriter {
   }
 
   // Flushes and renames the file to its target. Throws std::runtime_error if anything was not stored (disk
-  // full); the target is then unchanged.
+  // full); the target is then unchanged, and what was written is kept as <target>.incomplete.
   void close();
 
-  // Flushes to the system, so that the data survives a kill of the program. Returns false as write() does.
-  bool flush();
   // Ends an incomplete log and keeps it as <target>.incomplete; the target stays unchanged. Returns the kept
   // file's path, empty for a device or a pipe.
   std::string keep_incomplete();
 
   [[nodiscard]] const std::string& error() const { return error_; }
-  [[nodiscard]] std::uint64_t events() const { return events_; }
+  [[nodiscard]] std::uint64_t events() const { return file_ ? file_->events() : 0; }
 
  private:
   ReplacedPath path_;
-  lcm_eventlog_t* log_ = nullptr;
-  std::string channel_, error_;
+  std::optional<EventFile> file_;  // empty after its end
+  std::string error_;
   std::vector<std::uint8_t> scratch_;
-  std::uint64_t events_ = 0;
 };
 
 }  // namespace farpoint::ipc

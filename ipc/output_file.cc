@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/output_file.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -65,6 +66,7 @@ void ReplacedPath::commit() {
   if (writable_ != target_ && target_ != "-" && std::rename(writable_.c_str(), target_.c_str()) != 0) {
     fail("cannot rename to", target_, std::strerror(errno));
   }
+  if (has_temporary()) sync_folder_of(target_);
   committed_ = true;
 }
 
@@ -83,6 +85,14 @@ void OutputFile::close() {
   if (std::fclose(std::exchange(stream_, nullptr)) != 0 && error.empty()) error = std::strerror(errno);
   if (!error.empty()) fail("cannot write", path_.target(), error);
   path_.commit();
+}
+
+void sync_folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const int fd = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  (void)fsync(fd);
+  close(fd);
 }
 
 std::string flush_to_disk(std::FILE* stream) {

@@ -19,8 +19,10 @@ class ReplacedPath {
 
   [[nodiscard]] const std::string& target() const { return target_; }
   [[nodiscard]] const std::string& writable() const { return writable_; }  // open this one
-  // Throws std::runtime_error if the rename fails.
+  // Renames, and flushes the folder to the disk. Throws std::runtime_error if the rename fails.
   void commit();
+  // Leaves the temporary where it is, and the target unchanged.
+  void leave() { committed_ = true; }
   // Renames the temporary to the target's name with `suffix`, and returns that name; the target stays
   // unchanged. Returns empty without a temporary (a device or a pipe) or on failure.
   std::string keep_as(const std::string& suffix);
@@ -50,6 +52,8 @@ class OutputFile {
   std::FILE* stream_ = nullptr;
 };
 
+// Flushes the folder of a file to the disk, which makes a rename last.
+void sync_folder_of(const std::string& path);
 // Flushes a stream to the disk. Returns empty on success, else errno's text.
 [[nodiscard]] std::string flush_to_disk(std::FILE* stream);
 

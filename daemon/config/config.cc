@@ -239,6 +239,9 @@ void check_second_camera(const CameraConfig& camera, const ConfigOrigins& origin
   if (camera.driver == CameraDriverChoice::kLibcamera)
     fail(place_of("camera.second_device", origins),
          device + ", expected 'none' with camera.driver libcamera");
+  // Two readers of one log would begin at different times.
+  if (camera.driver == CameraDriverChoice::kFile)
+    fail(place_of("camera.second_device", origins), device + ", expected 'none' with camera.driver file");
   constexpr double kMicrosPerSecond = 1e6;
   if (camera.rate_hz > 0.0 && 2.0 * camera.pair_tolerance_us >= kMicrosPerSecond / camera.rate_hz) {
     fail(place_of("camera.pair_tolerance_us", origins),

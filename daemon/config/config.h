@@ -31,7 +31,14 @@ struct ControlConfig {
   std::string socket = "/run/farpoint/control";
 };
 
-enum class CameraDriverChoice { kV4l2, kLibcamera };
+// --record; 0: no limit.
+struct RecordConfig {
+  int max_size_mb = 0;
+  double max_minutes = 0;
+  double min_free_share = 0;  // of the disk
+};
+
+enum class CameraDriverChoice { kV4l2, kLibcamera, kFile, kLcm };
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
@@ -60,6 +67,7 @@ struct CameraConfig {
   StampPointChoice stamp = StampPointChoice::kAuto;
   int time_offset_us = 0;
   double stall_s = 1.0;        // silence after which the stream restarts
+  double open_limit_s = 30;    // of one opening or closing; longer is a hang
   double lost_after_s = 0.25;  // silence after which the state is 'no_camera'
   ExposureConfig exposure;
 
@@ -134,6 +142,7 @@ struct Config {
   LogConfig log;
   ControlConfig control;
   StateConfig state;
+  RecordConfig record;
   CameraConfig camera;
   ScaleConfig scale;
   LcmConfig lcm;

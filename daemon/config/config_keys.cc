@@ -91,8 +91,12 @@ std::vector<ConfigKey> make_keys() {
 
       text("state.folder", FIELD(state.folder)),
 
+      integer("record.max_size_mb", "MB", 0, 100000000, FIELD(record.max_size_mb)),
+      number("record.max_minutes", "min", 0, 1000000, FIELD(record.max_minutes)),
+      number("record.min_free_share", "", 0, 0.9, FIELD(record.min_free_share)),
+
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
-      enumeration("camera.driver", {"v4l2", "libcamera"}, FIELD(camera.driver)),
+      enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
       text("camera.second_device", FIELD(camera.second_device)),
@@ -105,6 +109,7 @@ std::vector<ConfigKey> make_keys() {
                   FIELD(camera.stamp)),
       integer("camera.time_offset_us", "us", -1000000, 1000000, FIELD(camera.time_offset_us)),
       number("camera.stall_s", "s", 0.1, 60, FIELD(camera.stall_s)),
+      number("camera.open_limit_s", "s", 1, 600, FIELD(camera.open_limit_s)),
       number("camera.lost_after_s", "s", 0.01, 10, FIELD(camera.lost_after_s)),
       enumeration("camera.exposure", {"camera", "auto", "manual"}, FIELD(camera.exposure.mode)),
       number("camera.exposure_us", "us", 1, 1e6, FIELD(camera.exposure.manual_us)),

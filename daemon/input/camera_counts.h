@@ -12,6 +12,7 @@ namespace farpoint::daemon {
   in.images = c.frames + c.flagged + c.undecodable + c.times_backwards;
   in.undecodable = c.undecodable;
   in.times_backwards = c.times_backwards;
+  in.times_unknown = c.times_unknown;
   in.missing = c.missing;
   in.flagged = c.flagged;
   in.camera_losses = c.lost + c.stalled;

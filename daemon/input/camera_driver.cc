@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/input/camera_driver.h"
 
+#include <stdexcept>
+
+#include "daemon/config/errors.h"
 #include "drivers/camera/live_camera.h"
+#include "drivers/lcm/socket_camera.h"
+#include "drivers/log/log_camera.h"
 #if FARPOINT_WITH_V4L2
 #include "drivers/v4l2/v4l2_device.h"
 #endif
@@ -50,6 +55,15 @@ std::unique_ptr<drivers::Camera> make_libcamera([[maybe_unused]] const drivers::
 #endif
 }
 
+std::unique_ptr<drivers::Camera> make_file(const drivers::CameraOptions& options) {
+  return std::make_unique<drivers::LiveCamera>(options, std::make_unique<drivers::LogCamera>(options));
+}
+
+std::unique_ptr<drivers::Camera> make_lcm(const drivers::CameraOptions& options, const std::string& key) {
+  require_name(drivers::SocketCamera::check(options.device), key);
+  return std::make_unique<drivers::LiveCamera>(options, std::make_unique<drivers::SocketCamera>(options));
+}
+
 }  // namespace
 
 std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver, const drivers::CameraOptions& options,
@@ -59,8 +73,23 @@ std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver, const dr
       return make_v4l2(options, key);
     case CameraDriverChoice::kLibcamera:
       return make_libcamera(options, key);
+    case CameraDriverChoice::kFile:
+      return make_file(options);
+    case CameraDriverChoice::kLcm:
+      return make_lcm(options, key);
   }
   return nullptr;
+}
+
+calibration_t calibration_of_log(const std::string& path) {
+  try {
+    drivers::LogSource source(path);
+    for (drivers::LogItem item; source.next(&item);)
+      if (item.kind == drivers::LogItemKind::kCalibration) return *item.calibration;
+  } catch (const std::runtime_error& error) {
+    throw InputError(error.what());
+  }
+  throw InputError(path + ": no CALIBRATION message, expected one (camera.calibration: log)");
 }
 
 }  // namespace farpoint::daemon

@@ -7,6 +7,7 @@
 
 #include "daemon/config/config.h"
 #include "drivers/camera/camera.h"
+#include "ipc/message.h"
 
 namespace farpoint::daemon {
 
@@ -16,5 +17,8 @@ namespace farpoint::daemon {
 [[nodiscard]] std::unique_ptr<drivers::Camera> make_camera(CameraDriverChoice driver,
                                                            const drivers::CameraOptions& options,
                                                            const std::string& key);
+
+// First CALIBRATION message of a log. Throws InputError without one.
+[[nodiscard]] calibration_t calibration_of_log(const std::string& path);
 
 }  // namespace farpoint::daemon

@@ -7,6 +7,7 @@
 
 #include "daemon/input/counts.h"
 #include "daemon/system/stage_clock.h"
+#include "drivers/camera/camera.h"
 #include "ipc/image_codec.h"
 #include "ipc/message.h"
 #include "slam/frame_result.h"
@@ -15,8 +16,7 @@ namespace farpoint::daemon {
 
 // One decoded image, valid until the source's next call.
 struct SourceFrame {
-  std::int64_t utime = 0;  // mid-exposure, microseconds
-  std::int64_t sequence = 0;
+  drivers::CameraFrame meta;
   const ipc::GreyImage* image = nullptr;
 
   [[nodiscard]] slam::ImageView view() const {

@@ -16,10 +16,7 @@ namespace farpoint::daemon {
 // One decoded image and its data.
 struct CapturedImage {
   ipc::GreyImage image;
-  std::int64_t utime = 0;
-  std::int64_t sequence = 0;
-  std::int32_t exposure_us = -1;    // -1 unknown
-  float gain = -1.0F;               // -1 unknown
+  drivers::CameraFrame meta;
   InputCounts in;                   // at the time of reading
   std::int64_t frames_dropped = 0;  // at the time of queueing
   double due_s = 0;                 // steady clock

@@ -58,7 +58,7 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
       say_undecodable(status);
       continue;
     }
-    *frame = {item.utime, item.image->sequence, &image_};
+    *frame = {{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &image_};
     gave_image_ = true;
     given_utime_ = item.utime;
     return true;

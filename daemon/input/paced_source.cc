@@ -29,13 +29,12 @@ CaptureStatus PacedSource::next(const std::atomic<bool>& stop, CapturedImage* im
   if (!started_) start_s_ = steady_s();
   started_ = true;
   source_.swap_image(&image->image);
-  image->utime = frame_.utime;
-  image->sequence = frame_.sequence;
+  image->meta = frame_.meta;
   image->in = source_.counts();
   image->progress = source_.progress();
   image->decode_cpu_ms = clock_.cpu_ms(timing_t::STAGE_DECODE);
   image->decode_wall_ms = clock_.wall_ms(timing_t::STAGE_DECODE);
-  image->due_s = start_s_ + 1e-6 * static_cast<double>(frame_.utime - first_utime_) / speed_;
+  image->due_s = start_s_ + 1e-6 * static_cast<double>(frame_.meta.utime - first_utime_) / speed_;
   sleep_until(image->due_s, stop);
   return stop.load(std::memory_order_relaxed) ? CaptureStatus::kEnd : CaptureStatus::kImage;
 }

@@ -12,7 +12,7 @@ class PacedSource final : public CaptureSource {
  public:
   // `source` has returned `first`, and outlives this object.
   PacedSource(FrameSource* source, const SourceFrame& first, double speed)
-      : source_(*source), frame_(first), first_utime_(first.utime), speed_(speed) {}
+      : source_(*source), frame_(first), first_utime_(first.meta.utime), speed_(speed) {}
 
   [[nodiscard]] CaptureStatus next(const std::atomic<bool>& stop, CapturedImage* image) override;
 

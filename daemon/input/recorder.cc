@@ -2,6 +2,7 @@
 #include "daemon/input/recorder.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "ipc/channels.h"
 
@@ -19,10 +20,10 @@ Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration)
   message.size = calibration.width * calibration.height;
 }
 
-Recorder::Recorder(const std::string& path, const calibration_t& calibration) : log_(path) {
+Recorder::Recorder(const std::string& path, const RecordConfig& limits, const calibration_t& calibration)
+    : recording_(path, limits, calibration) {
   for (const camera_calibration_t& camera : calibration.cameras)
     channels_.emplace_back(static_cast<int>(channels_.size()), camera);
-  log_.write_message(ipc::kCalibrationChannel, calibration.utime, calibration);
 }
 
 void Recorder::offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame) {
@@ -44,7 +45,7 @@ void Recorder::run() {
     const bool last = stop_.load(std::memory_order_acquire);
     write_all();
     if (last) return;
-    arrived_.wait(seen);
+    if (!recording_.tidy()) arrived_.wait(seen);
   }
 }
 
@@ -58,7 +59,8 @@ void Recorder::write_all() {
     message.gain = image->frame.gain;
     message.data.assign(image->pixels.begin(), image->pixels.end());
     channel->images.pop();
-    const bool stored = log_.write_message(channel->name, message.utime, message);
+    ipc::encode(message, &encoded_);
+    const bool stored = recording_.write(channel->name, message.utime, encoded_);
     (stored ? written_ : left_out_).fetch_add(1, std::memory_order_relaxed);
   }
 }
@@ -73,6 +75,13 @@ Recorder::Channel* Recorder::oldest() {
     found_utime = image->frame.utime;
   }
   return found;
+}
+
+void Recorder::close() {
+  const std::string problem = recording_.close();
+  if (problem.empty()) return;
+  throw std::runtime_error("the recording misses " + std::to_string(left_out()) +
+                           " images, what was written is kept: " + problem);
 }
 
 void Recorder::stop() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --record: writes the cameras' images to a log that can be replayed, on a thread of its own (fp-record).
-// When the disk is too slow, images are left out and counted; no thread waits.
+// When the disk is too slow or full, images are left out and counted; no thread waits, and what was written
+// is kept (recording.h).
 #pragma once
 
 #include <atomic>
@@ -9,10 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config/config.h"
+#include "daemon/input/recording.h"
 #include "daemon/system/notifier.h"
 #include "drivers/camera/camera.h"
 #include "ipc/image_codec.h"
-#include "ipc/log.h"
 #include "ipc/message.h"
 #include "slam/spsc_ring.h"
 
@@ -22,18 +24,22 @@ class Recorder {
  public:
   static constexpr const char* kThread = "fp-record";
 
-  // Records all cameras of the calibration, which begins the log. Throws std::runtime_error if the log cannot
-  // be written.
-  Recorder(const std::string& path, const calibration_t& calibration);
+  // Records all cameras of the calibration, which begins each file. Throws std::runtime_error if none can be
+  // written.
+  Recorder(const std::string& path, const RecordConfig& limits, const calibration_t& calibration);
 
   // Capture thread of this camera.
   void offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame);
-  // Recorder's thread: writes until stop(), then the remaining images.
+  // Recorder's thread: writes until stop(), then the remaining images. Between images it finishes what a
+  // killed run left.
   void run();
   // Call after the end of capture.
   void stop();
-  // Call after run() has returned. Throws std::runtime_error if anything was not stored.
-  void close() { log_.close(); }
+  // Call after run() has returned. Finishes the recording and keeps it in any case. Throws std::runtime_error
+  // if images are missing for a failure of the disk.
+  void close();
+  // Call after close(): the files written.
+  [[nodiscard]] std::vector<std::string> files() const { return recording_.files(); }
 
   // Of all cameras.
   [[nodiscard]] std::int64_t written() const { return written_.load(); }
@@ -56,7 +62,8 @@ class Recorder {
   // Returns the channel with the oldest waiting image; null without one.
   [[nodiscard]] Channel* oldest();
 
-  ipc::LogWriter log_;
+  Recording recording_;
+  std::vector<std::uint8_t> encoded_;
   std::deque<Channel> channels_;  // rings do not move
   Notifier arrived_;
   std::atomic<bool> stop_{false};

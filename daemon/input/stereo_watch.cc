@@ -7,37 +7,39 @@ namespace farpoint::daemon {
 
 using Side = drivers::StereoPairing::Side;
 
-StereoWatch::StereoWatch(SecondCamera* second, std::int64_t tolerance_us)
-    : second_(*second), pairing_({tolerance_us, kPatience_us}) {}
+StereoWatch::StereoWatch(CameraReports* further, std::int64_t tolerance_us)
+    : further_(further), pairing_({tolerance_us, kPatience_us}) {}
 
-void StereoWatch::note(std::optional<std::int64_t> utime, std::int64_t now_us) {
-  while (second_.take_news(&last_)) {
-    if (last_.has_image && !pairing_.put(Side::kRight, {last_.utime}, now_us)) ++right_refused_;
+void StereoWatch::note(const std::optional<drivers::CameraFrame>& image, std::int64_t now_us) {
+  while (further_->take(&last_)) {
+    if (last_.frame && !pairing_.put(Side::kRight, *last_.frame, now_us)) ++right_refused_;
     // First the image, then whether more are to be expected: a camera may give its last one and go.
     pairing_.set_away(Side::kRight, !last_.is_streaming);
     take_decided(now_us);
   }
-  if (utime && !pairing_.put(Side::kLeft, {*utime}, now_us)) ++left_refused_;
+  if (image && !pairing_.put(Side::kLeft, *image, now_us)) ++left_refused_;
   take_decided(now_us);
 }
 
-// The counts are all that is wanted of a frame: the first camera's image has gone on already.
 void StereoWatch::take_decided(std::int64_t now_us) {
-  for (drivers::StereoFrame decided; pairing_.take(now_us, &decided);) continue;
+  for (drivers::StereoFrame decided; pairing_.take(now_us, &decided);)
+    if (decided.is_pair()) skew_us_ = decided.right->utime - decided.left->utime;
 }
 
 void StereoWatch::add_to(InputCounts* in) const {
-  const InputCounts second = input_counts(last_.counts);
-  in->images += second.images;
-  in->undecodable += second.undecodable;
-  in->times_backwards += second.times_backwards;
-  in->missing += second.missing;
-  in->flagged += second.flagged;
-  in->camera_losses += second.camera_losses;
+  const InputCounts further = input_counts(last_.counts);
+  in->images += further.images;
+  in->undecodable += further.undecodable;
+  in->times_backwards += further.times_backwards;
+  in->times_unknown += further.times_unknown;
+  in->missing += further.missing;
+  in->flagged += further.flagged;
+  in->camera_losses += further.camera_losses;
   const drivers::StereoCounts& matched = pairing_.counts();
-  in->stereo_pairs = matched.pairs;
-  in->stereo_left_alone = matched.left_alone + left_refused_;
-  in->stereo_right_alone = matched.right_alone + right_refused_ + last_.untold;
+  in->stereo_pairs += matched.pairs;
+  in->stereo_left_alone += matched.left_alone + left_refused_;
+  in->stereo_right_alone += matched.right_alone + right_refused_ + last_.unreported;
+  in->stereo_skew_us = skew_us_;
 }
 
 }  // namespace farpoint::daemon

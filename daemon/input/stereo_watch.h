@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// Matches the images of a stereo pair by time, and counts pairs and single images. No image waits for the
-// result, which follows within kPatience_us; at once after the second camera went away. A second camera that
-// has not come yet may still open, so its partners are counted as alone after kPatience_us.
+// Matches the images of the first camera and a further one by time. Counts pairs and single images, and
+// measures how far the images of a pair are apart. No image waits for the result, which follows within
+// kPatience_us; at once after the further camera went away. A further camera that has not come yet may still
+// open, so its partners are counted as alone after kPatience_us.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
+#include "daemon/input/camera_reports.h"
 #include "daemon/input/counts.h"
-#include "daemon/input/second_camera.h"
 #include "drivers/camera/stereo_pairing.h"
 
 namespace farpoint::daemon {
 
 class StereoWatch {
  public:
-  // `second` outlives this object.
-  StereoWatch(SecondCamera* second, std::int64_t tolerance_us);
+  // `further`: reports of the further camera; outlives this object.
+  StereoWatch(CameraReports* further, std::int64_t tolerance_us);
 
-  // The first camera's capture thread calls it after each of its turns. Takes the second camera's new times
-  // and its own image, if any. now_us: CLOCK_MONOTONIC, like the images' times.
-  void note(std::optional<std::int64_t> utime, std::int64_t now_us);
-  // The second camera's images and losses, and the pairs so far.
+  // The first camera's capture thread calls it after each of its turns. Takes the further camera's new
+  // reports and its own image, if any. now_us: CLOCK_MONOTONIC, like the images' times.
+  void note(const std::optional<drivers::CameraFrame>& image, std::int64_t now_us);
+  // Adds the further camera's images and losses, and the pairs so far.
   void add_to(InputCounts* in) const;
 
  private:
@@ -29,10 +30,11 @@ class StereoWatch {
   static constexpr std::int64_t kPatience_us = 200'000;
   void take_decided(std::int64_t now_us);
 
-  SecondCamera& second_;
+  CameraReports* further_;
   drivers::StereoPairing pairing_;
   std::int64_t left_refused_ = 0, right_refused_ = 0;  // arrived after their turn
-  SecondCamera::News last_;
+  std::int64_t skew_us_ = 0;                           // of the last pair
+  CameraReport last_;
 };
 
 }  // namespace farpoint::daemon

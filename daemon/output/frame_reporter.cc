@@ -155,8 +155,10 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.stereo_pairs = in.stereo_pairs;
   s.stereo_left_alone = in.stereo_left_alone;
   s.stereo_right_alone = in.stereo_right_alone;
+  s.stereo_skew_us = in.stereo_skew_us;
   s.images_unknown_camera = in.unknown_camera;
   s.times_backwards = in.times_backwards;
+  s.times_unknown = in.times_unknown;
   s.messages_undecodable = in.messages_undecodable;
   s.log_damages = in.log_damages;
   s.imu_invalid = in.imu_invalid;
@@ -172,6 +174,7 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.can_received = out.can_received;
   s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
+  s.images_not_recorded = in.not_recorded;
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors()) + out.can_not_logged;
   s.side_missing = out.side_missing;
   s.side_failures = out.side_failures;

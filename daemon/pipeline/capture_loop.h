@@ -29,8 +29,9 @@ class CaptureLoop {
 
   // Any thread. Takes effect within 0.1 s.
   void stop() { stop_.store(true, std::memory_order_relaxed); }
-  // One other thread. Capture always has work: the source waits 0.1 s at most.
-  [[nodiscard]] bool is_alive(double now_s) { return progress_.is_alive(now_s, true); }
+  // One other thread. Capture always has work, as the source waits 0.1 s at most, except while a camera
+  // opens.
+  [[nodiscard]] bool is_alive(double now_s) { return progress_.is_alive(now_s, !source_.is_opening()); }
   // What reading threw, null otherwise. After the end of the thread.
   [[nodiscard]] const std::exception_ptr& error() const { return error_; }
 

@@ -54,7 +54,7 @@ void TrackingLoop::track(CapturedImage* image, FramePackage* package) {
   const slam::ImageView view{image->image.data(), image->image.width_px, image->image.height_px,
                              image->image.width_px};
   package->result =
-      estimator_.track({image->utime, image->sequence, 0, view, package->chance.features_asked});
+      estimator_.track({image->meta.utime, image->meta.sequence, 0, view, package->chance.features_asked});
   package->counts = estimator_.counts();
   package->in = image->in;
   package->due_s = image->due_s;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A live camera: one interface for all drivers. The capture thread makes all calls except construction,
-// destruction and set_exposure(). It waits in next() only; next() makes no heap call after the first images
-// and writes no log. A listener receives what an operator needs.
+// destruction, set_exposure() and opening_since_us(). It waits in next() only; next() makes no heap call
+// after the first images and writes no log. A listener receives what an operator needs.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +38,7 @@ enum class StampPoint : std::uint8_t {
 
 struct CameraOptions {
   std::string device = "/dev/video0";  // see camera_path.h
+  int index = 0;                       // of the calibration's cameras: N of CAMERA_N
   int width_px = 0, height_px = 0;     // of the calibration; the camera must deliver this size
   double rate_hz = 0;                  // 0: the camera's own
   CameraFormat format = CameraFormat::kAuto;
@@ -63,7 +64,8 @@ struct CameraCounts {
   std::int64_t flagged = 0;          // marked as damaged by the driver
   std::int64_t undecodable = 0;      // too short, or no JPEG
   std::int64_t times_backwards = 0;  // a time not after the one before it
-  std::int64_t times_unknown = 0;    // of no known clock; the time of arrival stands in
+  std::int64_t times_unknown = 0;    // of no known clock, or of a stream whose stamps
+                                     // run backwards; the time of arrival stands in
   std::int64_t opened = 0, lost = 0, stalled = 0;
 };
 
@@ -85,6 +87,10 @@ class Camera {
   [[nodiscard]] virtual bool next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame) = 0;
   [[nodiscard]] virtual bool is_streaming() const = 0;
   [[nodiscard]] virtual const CameraCounts& counts() const = 0;
+  // Callable from any thread. CLOCK_MONOTONIC, microseconds, when the running open or close of the device
+  // began, which may block for seconds; kNotOpening while none runs.
+  [[nodiscard]] virtual std::int64_t opening_since_us() const { return kNotOpening; }
+  static constexpr std::int64_t kNotOpening = -1;
   // Sets the listener, before the first next(). The capture thread calls it; it must not block.
   virtual void on_event(std::function<void(const CameraEvent&)> listener) = 0;
   // Callable from any thread at any time; takes effect with the next image.

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera/control_writer.h"
 
-#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
 namespace farpoint::drivers {
 
-ControlWriter::ControlWriter(Set set) : set_(std::move(set)) {
+ControlWriter::ControlWriter() {
   // Locked memory means all of it; the program's thread-local variables are in it, so that 64 kB are too few.
   constexpr std::size_t kStack_bytes = std::size_t{256} << 10;
   pthread_attr_t attributes;
@@ -29,20 +28,18 @@ ControlWriter::~ControlWriter() {
   pthread_join(thread_, nullptr);
 }
 
-bool ControlWriter::start(int fd, std::span<const ControlValue> controls) {
-  if (controls.size() > kMost || state_.load(std::memory_order_acquire) != State::kIdle) return false;
-  fd_ = fd;
-  count_ = controls.size();
-  std::copy(controls.begin(), controls.end(), controls_.begin());
+bool ControlWriter::start(ControlJob* job) {
+  if (state_.load(std::memory_order_acquire) != State::kIdle) return false;
+  job_ = job;
   state_.store(State::kWanted, std::memory_order_release);
   state_.notify_one();
   return true;
 }
 
-std::span<const ControlValue> ControlWriter::finished() {
-  if (state_.load(std::memory_order_acquire) != State::kOver) return {};
+bool ControlWriter::finished() {
+  if (state_.load(std::memory_order_acquire) != State::kOver) return false;
   state_.store(State::kIdle, std::memory_order_relaxed);
-  return std::span(controls_).first(count_);
+  return true;
 }
 
 void ControlWriter::wait() {
@@ -63,7 +60,7 @@ void ControlWriter::run() {
       state_.wait(state, std::memory_order_acquire);
       continue;
     }
-    for (ControlValue& control : std::span(controls_).first(count_)) control.taken = set_(fd_, control);
+    job_->run();
     state_.store(State::kOver, std::memory_order_release);
     state_.notify_all();
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera/frame_intake.h"
 
+#include <bit>
+
 #include "drivers/camera/pixel_conversion.h"
 
 namespace farpoint::drivers {
@@ -13,6 +15,7 @@ bool FrameIntake::take(const RawFrame& raw, const ClockReadings& now, ipc::GreyI
     return false;
   }
   const std::int64_t utime = time_of(raw, now);
+  judge_stamps(utime);
   if (utime <= last_utime_) {
     ++counts.times_backwards;
     return false;
@@ -39,8 +42,14 @@ void FrameIntake::count_sequence(std::uint32_t sequence) {
   last_driver_sequence_ = sequence;
 }
 
+// A repeated time is no sign of bad stamps: a driver may return one image twice.
+void FrameIntake::judge_stamps(std::int64_t utime) {
+  backwards_ = backwards_ << 1 | (utime < last_utime_ ? 1U : 0U);
+  if (std::popcount(backwards_) >= kBackwards) distrusts_stamps_ = true;
+}
+
 std::int64_t FrameIntake::time_of(const RawFrame& raw, const ClockReadings& now) {
-  const SourceClock clock = detect_clock(raw.stamp_us, now);
+  const SourceClock clock = distrusts_stamps_ ? SourceClock::kUnknown : detect_clock(raw.stamp_us, now);
   if (clock == SourceClock::kUnknown) {
     ++counts.times_unknown;
     return now.monotonic_us + options_.time_offset_us +

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turns a driver's buffer into an image: follows its number, converts its time, copies its pixels to grey,
-// and counts refused frames. Capture thread; no heap call after the first image.
+// and counts refused frames. A stamp of no clock is replaced by the time of arrival. So is each stamp of a
+// stream whose stamps went backwards in kBackwards of the last 32 images. Capture thread; no heap call after
+// the first image.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +34,11 @@ class FrameIntake {
   explicit FrameIntake(const CameraOptions& options) : options_(options) {}
 
   // Begins a new stream: the driver's numbers restart, the image's numbers continue.
-  void start_stream() { last_driver_sequence_.reset(); }
+  void start_stream() {
+    last_driver_sequence_.reset();
+    backwards_ = 0;
+    distrusts_stamps_ = false;
+  }
   // Returns false for a refused frame and counts the reason. `now` was read when the frame arrived.
   [[nodiscard]] bool take(const RawFrame& raw, const ClockReadings& now, ipc::GreyImage* image,
                           CameraFrame* frame);
@@ -42,13 +48,18 @@ class FrameIntake {
 
  private:
   void count_sequence(std::uint32_t sequence);
+  void judge_stamps(std::int64_t utime);
   [[nodiscard]] std::int64_t time_of(const RawFrame& raw, const ClockReadings& now);
   [[nodiscard]] bool to_grey(const RawFrame& raw, ipc::GreyImage* image);
+
+  static constexpr int kBackwards = 3;
 
   CameraOptions options_;
   ipc::ImageDecoder decoder_;
   std::int64_t last_utime_ = -1, sequence_ = -1;
   std::optional<std::uint32_t> last_driver_sequence_;
+  std::uint32_t backwards_ = 0;  // a bit for each of the last images, the newest lowest
+  bool distrusts_stamps_ = false;
 };
 
 }  // namespace farpoint::drivers

@@ -11,6 +11,20 @@ constexpr double kMicros = 1e6;
 
 }  // namespace
 
+// Marks the calls that may block for seconds: opening and closing the device.
+class LiveCamera::OpeningScope {
+ public:
+  explicit OpeningScope(LiveCamera* camera) : since_us_(camera->opening_since_us_) {
+    since_us_.store(camera->now_us(), std::memory_order_relaxed);
+  }
+  ~OpeningScope() { since_us_.store(kNotOpening, std::memory_order_relaxed); }
+  OpeningScope(const OpeningScope&) = delete;
+  OpeningScope& operator=(const OpeningScope&) = delete;
+
+ private:
+  std::atomic<std::int64_t>& since_us_;
+};
+
 LiveCamera::LiveCamera(const CameraOptions& options, std::unique_ptr<CameraDevice> device,
                        std::unique_ptr<CameraWait> wait)
     : device_(std::move(device)),
@@ -34,7 +48,10 @@ bool LiveCamera::next(int timeout_ms, ipc::GreyImage* image, CameraFrame* frame)
 // --- coming and going
 
 bool LiveCamera::open() {
-  const CameraEvent outcome = device_->open();
+  const CameraEvent outcome = [this] {
+    const OpeningScope scope(this);
+    return device_->open();
+  }();
   if (outcome.kind != CameraEvent::Kind::kStreaming) {
     leave(outcome);
     return false;
@@ -48,7 +65,10 @@ bool LiveCamera::open() {
 }
 
 void LiveCamera::leave(const CameraEvent& reason) {
-  device_->close();
+  {
+    const OpeningScope scope(this);
+    device_->close();
+  }
   streaming_ = false;
   search_.failed(reason, now_us());
 }

@@ -3,6 +3,7 @@
 // stall.
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "drivers/camera/camera.h"
@@ -26,9 +27,13 @@ class LiveCamera final : public Camera {
   void on_event(std::function<void(const CameraEvent&)> listener) override {
     search_.on_event(std::move(listener));
   }
+  [[nodiscard]] std::int64_t opening_since_us() const override {
+    return opening_since_us_.load(std::memory_order_relaxed);
+  }
   void set_exposure(const ExposureOptions& options) override { new_exposure_.put(options); }
 
  private:
+  class OpeningScope;
   bool open();
   void leave(const CameraEvent& reason);
   void lose(const char* what, int status);
@@ -42,6 +47,7 @@ class LiveCamera final : public Camera {
   CameraSearch search_;
   FrameIntake intake_;
   ExposureMailbox new_exposure_;
+  std::atomic<std::int64_t> opening_since_us_{kNotOpening};
   bool streaming_ = false;
   std::int64_t stall_us_;
   std::int64_t last_frame_us_ = 0;  // time of the last frame

@@ -5,14 +5,14 @@
 
 namespace farpoint::drivers {
 
-StereoImage StereoPairing::Queue::pop() {
-  const StereoImage image = images.at(first).image;
+CameraFrame StereoPairing::Queue::pop() {
+  const CameraFrame image = images.at(first).image;
   first = (first + 1) % kWaiting;
   --count;
   return image;
 }
 
-bool StereoPairing::put(Side side, const StereoImage& image, std::int64_t now_us) {
+bool StereoPairing::put(Side side, const CameraFrame& image, std::int64_t now_us) {
   Queue& own = queue(side);
   const bool backwards = own.last_utime && image.utime <= *own.last_utime;
   const bool overtaken = gone_utime_ && image.utime <= *gone_utime_;

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "drivers/camera/camera.h"
+
 namespace farpoint::drivers {
 
 struct StereoOptions {
@@ -17,15 +19,9 @@ struct StereoOptions {
   std::int64_t patience_us = 20'000;
 };
 
-// One image of one camera; the slot identifies its pixels to the caller.
-struct StereoImage {
-  std::int64_t utime = 0;  // mid-exposure
-  std::uint32_t slot = 0;
-};
-
 // A pair, or one image alone.
 struct StereoFrame {
-  std::optional<StereoImage> left, right;
+  std::optional<CameraFrame> left, right;
   [[nodiscard]] bool is_pair() const { return left && right; }
   [[nodiscard]] std::int64_t utime() const { return left ? left->utime : right->utime; }
 };
@@ -43,9 +39,9 @@ class StereoPairing {
   explicit StereoPairing(const StereoOptions& options) : options_(options) {}
 
   // Adds an image that arrived at `now_us` (clock of the images). Returns false for a refused image
-  // (counted); its slot returns to the caller. Precondition: take() was called until false since the last
+  // (counted). Precondition: take() was called until false since the last
   // put().
-  [[nodiscard]] bool put(Side side, const StereoImage& image, std::int64_t now_us);
+  [[nodiscard]] bool put(Side side, const CameraFrame& image, std::int64_t now_us);
   // Returns the next frame in order of time; false while none is decided. Call again after due_us().
   [[nodiscard]] bool take(std::int64_t now_us, StereoFrame* frame);
   // Time at which a waiting image becomes a frame alone; empty: none waits.
@@ -59,7 +55,7 @@ class StereoPairing {
   static constexpr std::size_t kWaiting = 8;  // of one side; more than patience_us admits
 
   struct Waiting {
-    StereoImage image;
+    CameraFrame image;
     std::int64_t came_us = 0;
   };
   struct Queue {
@@ -71,7 +67,7 @@ class StereoPairing {
     [[nodiscard]] bool is_full() const { return count == kWaiting; }
     [[nodiscard]] const Waiting* front() const { return count > 0 ? &images.at(first) : nullptr; }
     void push(const Waiting& image) { images.at((first + count++) % kWaiting) = image; }
-    StereoImage pop();
+    CameraFrame pop();
   };
 
   [[nodiscard]] Queue& queue(Side side) { return side == Side::kLeft ? left_ : right_; }

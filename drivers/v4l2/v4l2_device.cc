@@ -97,12 +97,13 @@ std::optional<StampPoint> V4l2Device::stamp_point(std::uint32_t flags) const {
 // --- exposure
 
 void V4l2Device::adapt_exposure(const ipc::GreyImage& image) {
+  exposure_.poll();
   if (exposure_.needs_brightness()) exposure_.update(mean_grey(image));
 }
 
 void V4l2Device::set_exposure(const ExposureOptions& options) {
   options_.exposure = options;
-  exposure_.start(system_.get(), node_.fd, options_.exposure);
+  exposure_.restart(options_.exposure);
 }
 
 }  // namespace farpoint::drivers

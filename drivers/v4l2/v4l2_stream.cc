@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <limits>
 
 namespace farpoint::drivers {
 namespace {
@@ -23,6 +24,14 @@ struct Description {
     buffer.length = VIDEO_MAX_PLANES;
   }
 };
+
+// A driver's stamp may hold anything: beyond the range it stays the largest or smallest there is.
+std::int64_t micros(const timeval& stamp) {
+  constexpr std::int64_t kMicros = 1'000'000,
+                         kMost_s = std::numeric_limits<std::int64_t>::max() / kMicros - 1;
+  const std::int64_t seconds = std::clamp<std::int64_t>(stamp.tv_sec, -kMost_s, kMost_s);
+  return seconds * kMicros + std::clamp<std::int64_t>(stamp.tv_usec, -kMicros, kMicros);
+}
 
 }  // namespace
 
@@ -81,8 +90,7 @@ int V4l2Stream::take(V4l2Buffer* buffer) {
   const auto* memory = static_cast<const std::uint8_t*>(mapping.memory);
   buffer->index = d.buffer.index;
   buffer->bytes = {memory + begin, std::max(end, begin) - begin};
-  buffer->stamp_us =
-      std::int64_t{d.buffer.timestamp.tv_sec} * 1'000'000 + std::int64_t{d.buffer.timestamp.tv_usec};
+  buffer->stamp_us = micros(d.buffer.timestamp);
   buffer->flags = d.buffer.flags;
   buffer->sequence = d.buffer.sequence;
   return 0;

@@ -2,7 +2,6 @@
 #include "drivers/v4l2/v4l2_system.h"
 
 #include <fcntl.h>
-#include <linux/videodev2.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -36,11 +35,6 @@ void* LinuxV4l2System::map(int fd, std::size_t bytes, std::int64_t offset) {
 
 void LinuxV4l2System::unmap(void* memory, std::size_t bytes) {
   munmap(memory, bytes);
-}
-
-bool LinuxV4l2System::set_control(int fd, const ControlValue& control) {
-  v4l2_control argument{control.id, control.value};
-  return ioctl(fd, VIDIOC_S_CTRL, &argument) >= 0;
 }
 
 }  // namespace farpoint::drivers

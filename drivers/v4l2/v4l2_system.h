@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "drivers/camera/control_writer.h"
 
@@ -22,9 +21,10 @@ class V4l2System {
   [[nodiscard]] virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;
   virtual void unmap(void* memory, std::size_t bytes) = 0;
 
-  // VIDIOC_S_CTRL without waiting for the camera; see ControlWriter. close() waits for a running call.
-  [[nodiscard]] virtual bool start_controls(int fd, std::span<const ControlValue> controls) = 0;
-  [[nodiscard]] virtual std::span<const ControlValue> finished_controls() = 0;
+  // Control calls without waiting for the camera; see ControlWriter, whose thread may call ioctl() meanwhile.
+  // close() waits for a running job.
+  [[nodiscard]] virtual bool start_controls(ControlJob* job) = 0;
+  [[nodiscard]] virtual bool finished_controls() = 0;
   virtual void wait_for_controls() = 0;
 };
 
@@ -35,15 +35,12 @@ class LinuxV4l2System final : public V4l2System {
   [[nodiscard]] int ioctl(int fd, unsigned long request, void* argument) override;
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
-  [[nodiscard]] bool start_controls(int fd, std::span<const ControlValue> controls) override {
-    return writer_.start(fd, controls);
-  }
-  [[nodiscard]] std::span<const ControlValue> finished_controls() override { return writer_.finished(); }
+  [[nodiscard]] bool start_controls(ControlJob* job) override { return writer_.start(job); }
+  [[nodiscard]] bool finished_controls() override { return writer_.finished(); }
   void wait_for_controls() override { writer_.wait(); }
 
  private:
-  ControlWriter writer_{[this](int fd, const ControlValue& control) { return set_control(fd, control); }};
-  bool set_control(int fd, const ControlValue& control);
+  ControlWriter writer_;
 };
 
 }  // namespace farpoint::drivers

@@ -38,6 +38,10 @@ class FilmCamera final : public drivers::Camera {
     away_from_s_ = from_s;
     away_to_s_ = to_s;
   }
+  // Each of its images has a stamp of no clock, as its driver counts it.
+  void lose_stamps() { loses_stamps_ = true; }
+  // Its first opening takes this long.
+  void open_slowly(double takes_s) { opening_takes_s_ = takes_s; }
   // One shutter for both: image n of the other is taken `later_us` after image n of this one. Images due while
   // a camera is away never come.
   void share_shutter_with(FilmCamera* other, std::int64_t later_us) {
@@ -47,6 +51,7 @@ class FilmCamera final : public drivers::Camera {
 
   bool next(int timeout_ms, ipc::GreyImage* image, drivers::CameraFrame* frame) override {
     const double now_s = steady_s();
+    if (opening_takes_s_ > 0.0) return open(now_s);
     begin(now_s);
     streaming_ = now_s - began_s_ < away_from_s_ || now_s - began_s_ >= away_to_s_;
     if (shutter_ && !streaming_) miss_until(now_s);
@@ -59,9 +64,11 @@ class FilmCamera final : public drivers::Camera {
     frame->utime = std::llround(1e6 * (shutter_ ? due_s : steady_s())) + later_us_;
     frame->sequence = shown_++;
     ++counts_.frames;
+    if (loses_stamps_) ++counts_.times_unknown;
     return true;
   }
   [[nodiscard]] bool is_streaming() const override { return streaming_; }
+  [[nodiscard]] std::int64_t opening_since_us() const override { return opening_since_us_; }
   [[nodiscard]] const drivers::CameraCounts& counts() const override { return counts_; }
   void on_event(std::function<void(const drivers::CameraEvent&)>) override {}
   void set_exposure(const drivers::ExposureOptions& options) override { *target_grey_ = options.target_grey; }
@@ -70,6 +77,12 @@ class FilmCamera final : public drivers::Camera {
   [[nodiscard]] std::shared_ptr<std::atomic<double>> target_grey() const { return target_grey_; }
 
  private:
+  bool open(double now_s) {
+    opening_since_us_ = std::llround(1e6 * now_s);
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::exchange(opening_takes_s_, 0.0)));
+    opening_since_us_ = kNotOpening;
+    return false;
+  }
   void begin(double now_s) {
     if (began_s_ >= 0.0) return;
     began_s_ = now_s;
@@ -86,6 +99,9 @@ class FilmCamera final : public drivers::Camera {
   std::int64_t later_us_ = 0;
   double began_s_ = -1.0, away_from_s_ = 1e9, away_to_s_ = 1e9;
   int shown_ = 0;
+  double opening_takes_s_ = 0;
+  std::atomic<std::int64_t> opening_since_us_{kNotOpening};
+  bool loses_stamps_ = false;
   std::atomic<bool> streaming_{true};
   drivers::CameraCounts counts_;
 };

@@ -111,6 +111,21 @@ TEST_F(Live, ACameraThatIsAwayIsPublishedAtOnceAndAtTheStatusRate) {
   EXPECT_GT(last_seen_.result.utime, silent_.back().result.utime);
 }
 
+TEST_F(Live, StampsOfNoClockAreCountedInTheStatusAndSaidInTheLogNowAndThen) {
+  camera_->lose_stamps();
+  options_.output = scratch_.path("out.lcm");
+  config_.lcm.status_rate_hz = 100;
+  ASSERT_EQ(run([this] { return frames_ >= 45; }), 0);
+  const auto status = test::messages_of<status_t>(options_.output, ipc::kStatusChannel);
+  ASSERT_FALSE(status.empty());
+  EXPECT_GE(status.back().times_unknown, 45);
+  const std::string said = "camera /dev/video0: ";
+  const std::size_t first = printed_.find(said);
+  ASSERT_NE(first, std::string::npos) << printed_;
+  EXPECT_NE(printed_.find("images with a time stamp of no clock", first), std::string::npos) << printed_;
+  EXPECT_EQ(printed_.find(said, first + 1), std::string::npos) << printed_;  // 2 s: once
+}
+
 TEST_F(Live, WithoutACameraItIsReadyAliveAndSaysSo) {
   test::NotifySocket manager(scratch_.path("notify"), 400'000);
   camera_->leave(0.0, 1e9);
@@ -124,6 +139,42 @@ TEST_F(Live, WithoutACameraItIsReadyAliveAndSaysSo) {
   EXPECT_EQ(manager.count("STOPPING=1"), 1);
   EXPECT_GE(manager.count("STATUS=no_camera"), 1);
   EXPECT_GE(manager.count("WATCHDOG=1"), 5);
+}
+
+TEST_F(Live, ACameraThatTakesLongToOpenIsNoHang) {
+  test::NotifySocket manager(scratch_.path("notify"), 400'000);
+  camera_->open_slowly(2.5);
+  const double began_s = steady_s();
+  hooks_.on_watch = [&] { manager.read_all(); };
+  EXPECT_EQ(run([this] { return frames_ >= 10; }), 0);
+  manager.read_all();
+  int meanwhile = 0;
+  for (const auto& [time_s, text] : manager.messages)
+    meanwhile += text.starts_with("WATCHDOG=1") && time_s > began_s + 0.5 && time_s < began_s + 2.4 ? 1 : 0;
+  EXPECT_GE(meanwhile, 10);
+  EXPECT_GE(silent_.size(), 5U);  // meanwhile: no camera
+  EXPECT_NE(printed_.find("camera /dev/video0: opening or closing it has taken"), std::string::npos)
+      << printed_;
+}
+
+TEST_F(Live, ACameraThatOpensForLongerThanItsLimitIsAHang) {
+  test::NotifySocket manager(scratch_.path("notify"), 400'000);
+  config_.camera.open_limit_s = 1.0;
+  camera_->open_slowly(2.5);
+  const double began_s = steady_s();
+  hooks_.on_watch = [&] { manager.read_all(); };
+  EXPECT_EQ(run([this] { return frames_ >= 10; }), 0);
+  int meanwhile = 0, after = 0;
+  for (const auto& [time_s, text] : manager.messages) {
+    if (!text.starts_with("WATCHDOG=1")) continue;
+    // It opens from the start of the run on, which is a moment after began_s.
+    if (time_s > began_s + 2.7)
+      ++after;
+    else if (time_s > began_s + 1.7 && time_s < began_s + 2.4)
+      ++meanwhile;
+  }
+  EXPECT_EQ(meanwhile, 0);
+  EXPECT_GE(after, 1);
 }
 
 TEST_F(Live, TheBusTellsTheTruthFromStartToStopWhileTrackingHangs) {

@@ -12,6 +12,7 @@
 
 #include "ipc/channels.h"
 #include "tests/ipc/scratch.h"
+#include "tests/support/file_size_limit.h"
 
 namespace farpoint::ipc {
 namespace {
@@ -280,6 +281,29 @@ TEST(Log, AFullDiskIsReported) {
   Bytes data(100'000);
   for (int i = 0; i < 10; ++i) writer.write("A", 0, data);
   EXPECT_THROW(writer.close(), std::runtime_error);
+}
+
+TEST(Log, WhatWasWrittenBeforeTheDiskWasFullIsKept) {
+  const test::Scratch scratch;
+  test::write_bytes(scratch.path("a.lcm"), {1, 2, 3});
+  LogWriter writer(scratch.path("a.lcm"));
+  const Bytes data(10'000);
+  {
+    const test::FileSizeLimit full(35'000);
+    for (int i = 0; i < 6; ++i) EXPECT_EQ(writer.write("A", i, data), i < 3);
+  }
+  try {
+    writer.close();
+    ADD_FAILURE() << "no failure was reported";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("File too large; what was written is kept as"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(test::read_bytes(scratch.path("a.lcm")), (Bytes{1, 2, 3}));
+  LogDamage damage;
+  EXPECT_EQ(read_file(scratch.path("a.lcm.incomplete"), &damage).size(), 3U);
+  EXPECT_EQ(damage.places, 0U);
 }
 
 TEST(Log, AMissingFolderIsReported) {

@@ -172,7 +172,7 @@ std::vector<TrackedFrame> GapExperiment::replay(const std::vector<Gap>& gaps,
   daemon::StageClock clock;
   daemon::SourceFrame frame;
   if (!source.next(&frame, &clock)) return {};
-  const std::int64_t first_utime = frame.utime;
+  const std::int64_t first_utime = frame.meta.utime;
   slam::Rig rig = daemon::make_rig(source.calibration(), 0);
   // The estimator's body stands at camera 0 while the scale is unknown.
   tools::move_reference_point({Eigen::Quaterniond::Identity(), rig.cameras[0].T_body_camera.t}, &truth);
@@ -182,21 +182,21 @@ std::vector<TrackedFrame> GapExperiment::replay(const std::vector<Gap>& gaps,
   std::vector<TrackedFrame> out;
   const Gap* last_gap = nullptr;
   do {
-    const double time_s = 1e-6 * static_cast<double>(frame.utime - first_utime);
+    const double time_s = 1e-6 * static_cast<double>(frame.meta.utime - first_utime);
     if (time_s > until_s_) break;
     const auto gap = std::find_if(gaps.begin(), gaps.end(), [&](const Gap& g) { return is_in(g, time_s); });
     slam::ImageView image = frame.view();
     std::vector<std::uint8_t> black;
     if (gap != gaps.end()) {
       if (std::exchange(last_gap, &*gap) != &*gap)
-        snapshots->push_back({landmarks_of_late(estimator, frame.utime), rig.cameras[0]});
+        snapshots->push_back({landmarks_of_late(estimator, frame.meta.utime), rig.cameras[0]});
       if (gap->kind == GapKind::kMissing) continue;
       black.assign(static_cast<std::size_t>(image.stride_bytes * image.height_px), 0);
       image.data = black.data();
     }
-    const slam::FrameResult& r = estimator.process({frame.utime, frame.sequence, 0, image});
+    const slam::FrameResult& r = estimator.process({frame.meta.utime, frame.meta.sequence, 0, image});
     out.push_back({time_s, r.state, r.map_id, r.T_map_body, r.T_odom_body,
-                   nearest_truth(truth, tools::seconds_of(frame.utime)), r.reset_counter});
+                   nearest_truth(truth, tools::seconds_of(frame.meta.utime)), r.reset_counter});
   } while (source.next(&frame, &clock));
   return out;
 }

@@ -15,6 +15,8 @@ status_t status_of(int state) {
   s.quality = 87;
   s.frames_received = 1234;
   s.images_flagged = 5;
+  s.times_unknown = 17;
+  s.images_not_recorded = 23;
   s.can_state = status_t::CAN_BUS_OFF;
   s.memory_pool_bytes = 101'000'000;
   s.build = "0.1.0 abc";
@@ -49,10 +51,11 @@ TEST(Top, ShowsStateRatesAndHealth) {
     if (i % 6 == 0) board.take(status_of(status_t::STATE_TRACKING), now_s);
   }
   const std::string text = board.render(102.0, false);
-  for (const char* part : {"TRACKING   quality 87", "odometry 30.0 Hz   status 5.0 Hz", "x 12.34",
-                           "heading 90.0 deg   speed 5.00 units/s", "p50 30.0  p99 59.0  max 60.0 ms",
-                           "p50 7.0  p99 7.0  max 7.0 ms", "1234 images", "5 flagged", "CAN       bus off",
-                           "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
+  for (const char* part :
+       {"TRACKING   quality 87", "odometry 30.0 Hz   status 5.0 Hz", "x 12.34",
+        "heading 90.0 deg   speed 5.00 units/s", "p50 30.0  p99 59.0  max 60.0 ms",
+        "p50 7.0  p99 7.0  max 7.0 ms", "1234 images", "5 flagged", "17 stamps of no clock",
+        "23 not recorded", "CAN       bus off", "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
     EXPECT_TRUE(has(text, part)) << part << "\n" << text;
   }
   std::istringstream lines(text);
@@ -69,12 +72,14 @@ TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
   s.stereo_pairs = 912;
   s.stereo_left_alone = 34;
   s.stereo_right_alone = 5;
+  s.stereo_skew_us = -1234;
   board.take(s, 100.2);
   const std::string text = board.render(100.3, false);
-  EXPECT_TRUE(has(text, "stereo    912 pairs   34 left alone   5 right alone\n")) << text;
+  EXPECT_TRUE(has(text, "stereo    912 pairs   34 left alone   5 right alone   skew -1.2 ms\n")) << text;
   s.stereo_pairs = s.stereo_right_alone = 0;  // it never came
   board.take(s, 100.4);
-  EXPECT_TRUE(has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone\n"));
+  EXPECT_TRUE(
+      has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone   skew -1.2 ms\n"));
 }
 
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {

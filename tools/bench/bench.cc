@@ -63,7 +63,7 @@ BenchPass run_pass(const BenchOptions& options, const daemon::Config& config,
     }
     const slam::ImageView view{frame.image->data(), frame.image->width_px, frame.image->height_px,
                                frame.image->width_px};
-    const slam::FrameInput input{frame.utime, frame.sequence, 0, view};
+    const slam::FrameInput input{frame.meta.utime, frame.meta.sequence, 0, view};
     const bool followed = estimator->process(input).followed();
     const double ended_s = daemon::process_cpu_s();
     if (!followed) clock.forget(timing_t::STAGE_TRACKING);

@@ -39,12 +39,14 @@ const std::array kFaults = {Fault{"frames dropped", &status_t::frames_dropped},
                             Fault{"wrong size", &status_t::images_wrong_size},
                             Fault{"undecodable images", &status_t::images_undecodable},
                             Fault{"time backwards", &status_t::times_backwards},
+                            Fault{"stamps of no clock", &status_t::times_unknown},
                             Fault{"undecodable messages", &status_t::messages_undecodable},
                             Fault{"log damage", &status_t::log_damages},
                             Fault{"IMU invalid", &status_t::imu_invalid},
                             Fault{"CAN send", &status_t::can_send_errors},
                             Fault{"LCM send", &status_t::lcm_send_errors},
                             Fault{"log write", &status_t::log_write_errors},
+                            Fault{"not recorded", &status_t::images_not_recorded},
                             Fault{"lost", &status_t::times_lost}};
 
 void draw_states(const RunRecord& run, double top, double left, double px_per_s, Svg* svg) {

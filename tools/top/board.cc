@@ -150,8 +150,9 @@ std::string Board::count_lines() const {
       s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
       s.camera_losses);
   if (s.stereo_pairs > 0 || s.stereo_left_alone > 0 || s.stereo_right_alone > 0) {
-    text += fmt::format("stereo    {} pairs   {} left alone   {} right alone\n", s.stereo_pairs,
-                        s.stereo_left_alone, s.stereo_right_alone);
+    text +=
+        fmt::format("stereo    {} pairs   {} left alone   {} right alone   skew {:.1f} ms\n", s.stereo_pairs,
+                    s.stereo_left_alone, s.stereo_right_alone, 1e-3 * static_cast<double>(s.stereo_skew_us));
   }
   text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
                       s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
@@ -159,8 +160,9 @@ std::string Board::count_lines() const {
                       s.vmps);
   text += fmt::format("CAN       {}   {} not sent   {} bus-offs   {} received\n", can_state_name(s.can_state),
                       s.can_send_errors, s.can_bus_offs, s.can_received);
-  text += fmt::format("errors    {} LCM   {} log   {} times backwards\n", s.lcm_send_errors,
-                      s.log_write_errors, s.times_backwards);
+  text += fmt::format(
+      "errors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
+      s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);
   if (timing_) {
     text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
                         static_cast<double>(timing_->resident_bytes) / kMegabyte,

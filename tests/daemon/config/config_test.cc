@@ -249,6 +249,9 @@ TEST(ConfigMistakes, TheSecondCameraFitsTheFirst) {
             "f.yaml:2: camera.second_device: '/dev/video2', expected another camera than camera.device");
   EXPECT_EQ(error_of(second + "  driver: libcamera\n"),
             "f.yaml:2: camera.second_device: '/dev/video2', expected 'none' with camera.driver libcamera");
+  EXPECT_EQ(error_of(second + "  driver: file\n"),
+            "f.yaml:2: camera.second_device: '/dev/video2', expected 'none' with camera.driver file");
+  EXPECT_EQ(error_of(second + "  driver: lcm\n"), "");
   EXPECT_EQ(error_of(second + "  pair_tolerance_us: 16667\n"),
             "f.yaml:3: camera.pair_tolerance_us: 16667, expected less than half a frame period of "
             "camera.rate_hz (30)");

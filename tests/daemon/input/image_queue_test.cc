@@ -12,7 +12,7 @@ namespace {
 void push(ImageQueue* queue, std::int64_t utime) {
   CapturedImage* image = queue->begin_push();
   ASSERT_NE(image, nullptr);
-  image->utime = utime;
+  image->meta.utime = utime;
   image->image.pixels[0] = static_cast<std::uint8_t>(utime);
   queue->push();
 }
@@ -25,11 +25,11 @@ TEST(ImageQueue, TheNewestWin) {
   EXPECT_EQ(queue.dropped(), 3);
   CapturedImage* image = queue.pop();
   ASSERT_NE(image, nullptr);
-  EXPECT_EQ(image->utime, 4);
+  EXPECT_EQ(image->meta.utime, 4);
   EXPECT_EQ(image->frames_dropped, 2);  // when it was queued
   queue.give_back(image);
   image = queue.pop();
-  EXPECT_EQ(image->utime, 5);
+  EXPECT_EQ(image->meta.utime, 5);
   queue.give_back(image);
   EXPECT_EQ(queue.pop(), nullptr);
 }
@@ -39,7 +39,7 @@ TEST(ImageQueue, TheImageBeingTrackedIsNotTouched) {
   push(&queue, 1);
   const CapturedImage* tracked = queue.pop();
   for (std::int64_t utime = 2; utime <= 20; ++utime) push(&queue, utime);
-  EXPECT_EQ(tracked->utime, 1);
+  EXPECT_EQ(tracked->meta.utime, 1);
   EXPECT_EQ(tracked->image.pixels[0], 1);
   EXPECT_EQ(queue.dropped(), 18);
 }
@@ -59,16 +59,16 @@ TEST(ImageQueue, BetweenThreadsEveryImageIsTrackedOrCountedAndNoneIsTorn) {
         continue;
       }
       ++tracked;
-      unordered = unordered || image->utime <= last;
-      last = image->utime;
+      unordered = unordered || image->meta.utime <= last;
+      last = image->meta.utime;
       for (const std::uint8_t pixel : image->image.pixels)
-        torn = torn || pixel != static_cast<std::uint8_t>(image->utime);
+        torn = torn || pixel != static_cast<std::uint8_t>(image->meta.utime);
       queue.give_back(image);
     }
   });
   for (std::int64_t utime = 1; utime <= kImages; ++utime) {
     CapturedImage* image = queue.begin_push();
-    image->utime = utime;
+    image->meta.utime = utime;
     for (std::uint8_t& pixel : image->image.pixels) pixel = static_cast<std::uint8_t>(utime);
     queue.push();
     if (utime % 7 == 0) std::this_thread::yield();

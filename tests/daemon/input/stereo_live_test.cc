@@ -47,6 +47,7 @@ TEST_F(StereoLive, ImagesOfOneShutterArePairs) {
   const status_t last = status().back();
   EXPECT_GE(last.stereo_pairs, 30 - kUndecided);
   EXPECT_LE(last.stereo_left_alone, kUndecided);
+  EXPECT_EQ(last.stereo_skew_us, 2'000);
   EXPECT_GE(last.frames_received, last.frames_tracked + last.stereo_pairs);
 }
 

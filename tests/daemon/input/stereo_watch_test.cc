@@ -46,28 +46,31 @@ class ScriptedCamera final : public drivers::Camera {
 
 class StereoWatchTest : public testing::Test {
  protected:
-  StereoWatchTest() {
-    auto camera = std::make_unique<ScriptedCamera>();
-    right_camera_ = camera.get();
-    second_.emplace(std::move(camera));
-    watch_.emplace(&*second_, kTolerance_us);
-  }
-
+  // One turn of the right camera's thread.
   void right(std::optional<std::int64_t> utime) {
-    right_camera_->turns.push_back(utime);
-    second_->turn();
+    std::optional<drivers::CameraFrame> frame;
+    if (utime) frame.emplace(frame_at(*utime)).sequence = right_counts_.frames++;
+    reports_.put(frame, right_streaming_, right_counts_);
   }
   // The left camera's image comes `late_us` after it was taken.
-  void left(std::int64_t utime, std::int64_t late_us = 1'000) { watch_->note(utime, utime + late_us); }
+  void left(std::int64_t utime, std::int64_t late_us = 1'000) {
+    watch_.note(frame_at(utime), utime + late_us);
+  }
   [[nodiscard]] InputCounts counts() const {
     InputCounts in;
-    watch_->add_to(&in);
+    watch_.add_to(&in);
     return in;
   }
+  static drivers::CameraFrame frame_at(std::int64_t utime) {
+    drivers::CameraFrame frame;
+    frame.utime = utime;
+    return frame;
+  }
 
-  ScriptedCamera* right_camera_ = nullptr;
-  std::optional<SecondCamera> second_;
-  std::optional<StereoWatch> watch_;
+  bool right_streaming_ = true;
+  drivers::CameraCounts right_counts_;
+  CameraReports reports_;
+  StereoWatch watch_{&reports_, kTolerance_us};
 };
 
 TEST_F(StereoWatchTest, ImagesWithinTheToleranceArePairsWhicheverComesFirst) {
@@ -80,10 +83,23 @@ TEST_F(StereoWatchTest, ImagesWithinTheToleranceArePairsWhicheverComesFirst) {
     left(i * kPeriod_us);
     right(i * kPeriod_us - kTolerance_us);
   }
-  watch_->note(std::nullopt, 20 * kPeriod_us);
+  watch_.note(std::nullopt, 20 * kPeriod_us);
   EXPECT_EQ(counts().stereo_pairs, 20);
   EXPECT_EQ(counts().stereo_left_alone, 0);
   EXPECT_EQ(counts().stereo_right_alone, 0);
+}
+
+TEST_F(StereoWatchTest, TheSkewIsThatOfTheLastPair) {
+  left(0);
+  right(3'000);
+  left(kPeriod_us);
+  EXPECT_EQ(counts().stereo_skew_us, 3'000);
+  right(kPeriod_us - 2'000);
+  left(2 * kPeriod_us);
+  EXPECT_EQ(counts().stereo_skew_us, -2'000);
+  right(2 * kPeriod_us + kTolerance_us + 1);
+  watch_.note(std::nullopt, 3 * kPeriod_us + kPatience_us);
+  EXPECT_EQ(counts().stereo_skew_us, -2'000);  // a single image has none
 }
 
 TEST_F(StereoWatchTest, ImagesFurtherApartAreAlone) {
@@ -91,7 +107,7 @@ TEST_F(StereoWatchTest, ImagesFurtherApartAreAlone) {
     right(i * kPeriod_us + kTolerance_us + 1);
     left(i * kPeriod_us);
   }
-  watch_->note(std::nullopt, 10 * kPeriod_us + kPatience_us);
+  watch_.note(std::nullopt, 10 * kPeriod_us + kPatience_us);
   EXPECT_EQ(counts().stereo_pairs, 0);
   EXPECT_EQ(counts().stereo_left_alone, 10);
   EXPECT_EQ(counts().stereo_right_alone, 10);
@@ -104,11 +120,11 @@ TEST_F(StereoWatchTest, WhileTheSecondCameraIsAwayEachImageIsAloneAtOnce) {
   right(kPeriod_us);
   left(kPeriod_us);
   EXPECT_EQ(counts().stereo_pairs, 2);
-  right_camera_->streaming = false;
+  right_streaming_ = false;
   right(std::nullopt);
   left(2 * kPeriod_us);
   EXPECT_EQ(counts().stereo_left_alone, 1);
-  right_camera_->streaming = true;
+  right_streaming_ = true;
   right(3 * kPeriod_us);
   left(3 * kPeriod_us);
   EXPECT_EQ(counts().stereo_pairs, 3);
@@ -135,7 +151,7 @@ TEST_F(StereoWatchTest, TheLastImageBeforeItWentStillFindsItsPartner) {
   right(0);
   left(0);
   left(kPeriod_us);
-  right_camera_->streaming = false;
+  right_streaming_ = false;
   right(kPeriod_us);
   left(2 * kPeriod_us);
   EXPECT_EQ(counts().stereo_pairs, 2);
@@ -146,65 +162,66 @@ TEST_F(StereoWatchTest, ASilentPartnerIsGivenUpAfterAWhile) {
   right(0);
   left(0);
   left(kPeriod_us, 0);
-  watch_->note(std::nullopt, kPeriod_us + kPatience_us - 1);
+  watch_.note(std::nullopt, kPeriod_us + kPatience_us - 1);
   EXPECT_EQ(counts().stereo_left_alone, 0);
-  watch_->note(std::nullopt, kPeriod_us + kPatience_us);
+  watch_.note(std::nullopt, kPeriod_us + kPatience_us);
   EXPECT_EQ(counts().stereo_left_alone, 1);
   // What comes after its turn has no partner any more.
   right(kPeriod_us);
-  watch_->note(std::nullopt, 2 * kPeriod_us + kPatience_us);
+  watch_.note(std::nullopt, 2 * kPeriod_us + kPatience_us);
   EXPECT_EQ(counts().stereo_right_alone, 1);
   EXPECT_EQ(counts().stereo_pairs, 1);
 }
 
 TEST_F(StereoWatchTest, EveryImageOfTheFirstIsCountedOnceAlsoOneThatComesAfterItsTurn) {
   right(0);
-  watch_->note(std::nullopt, 0);
-  watch_->note(std::nullopt, kPatience_us);  // given up: the first camera was away
+  watch_.note(std::nullopt, 0);
+  watch_.note(std::nullopt, kPatience_us);  // given up: the first camera was away
   left(0, kPatience_us + 1);
   EXPECT_EQ(counts().stereo_right_alone, 1);
   EXPECT_EQ(counts().stereo_left_alone, 1);
   EXPECT_EQ(counts().stereo_pairs, 0);
 }
 
-TEST_F(StereoWatchTest, ImagesOfWhichTheFirstCamerasThreadNeverHeardAreCountedToo) {
+TEST_F(StereoWatchTest, ImagesOfWhichNoReportTellsTheFirstCamerasThreadAreCountedToo) {
   for (int i = 0; i < 100; ++i) right(i * kPeriod_us);
-  watch_->note(std::nullopt, 0);
+  watch_.note(std::nullopt, 0);
   EXPECT_EQ(counts().images, 64);  // what there was room to tell
   right(std::nullopt);
-  for (int i = 0; i < 2; ++i) watch_->note(std::nullopt, 100 * kPeriod_us + i * kPatience_us);
+  for (int i = 0; i < 2; ++i) watch_.note(std::nullopt, 100 * kPeriod_us + i * kPatience_us);
   EXPECT_EQ(counts().stereo_right_alone, 100);
   EXPECT_EQ(counts().images, 100);
 }
 
 TEST_F(StereoWatchTest, TheSecondCamerasCountsAreAddedToTheFirstOnes) {
-  right_camera_->counts_.lost = 2;
-  right_camera_->counts_.stalled = 1;
-  right_camera_->counts_.missing = 5;
-  right_camera_->counts_.flagged = 7;
+  right_counts_.lost = 2;
+  right_counts_.stalled = 1;
+  right_counts_.missing = 5;
+  right_counts_.flagged = 7;
   right(0);
-  watch_->note(std::nullopt, 0);
+  watch_.note(std::nullopt, 0);
   InputCounts in;
   in.images = 100;
   in.camera_losses = 10;
-  watch_->add_to(&in);
+  watch_.add_to(&in);
   EXPECT_EQ(in.images, 108);
   EXPECT_EQ(in.camera_losses, 13);
   EXPECT_EQ(in.missing, 5);
   EXPECT_EQ(in.flagged, 7);
 }
 
-TEST_F(StereoWatchTest, AnImageOfTheFirstCameraGoesOnInItsOwnTurnWithoutItsPartner) {
-  right(0);  // it streams, so that a partner of what follows may still come
-  auto camera = std::make_unique<ScriptedCamera>();
-  camera->turns = {kPeriod_us, 2 * kPeriod_us, 3 * kPeriod_us};
-  CameraSource source(std::move(camera));
-  source.pair_with(&*second_, kTolerance_us);
+TEST(CameraSource, AnImageOfTheFirstCameraGoesOnInItsOwnTurnWithoutItsPartner) {
+  auto right = std::make_unique<ScriptedCamera>(), left = std::make_unique<ScriptedCamera>();
+  right->turns = {0};
+  left->turns = {kPeriod_us, 2 * kPeriod_us, 3 * kPeriod_us};
+  CameraSource further(1, std::move(right)), first(0, std::move(left));
+  first.pair_with(&further, kTolerance_us);
+  further.turn();  // it streams, so that a partner of what follows may still come
   const std::atomic<bool> stop{false};
   for (int i = 1; i <= 3; ++i) {
     CapturedImage image;
-    ASSERT_EQ(source.next(stop, &image), CaptureStatus::kImage);
-    EXPECT_EQ(image.utime, i * kPeriod_us);
+    ASSERT_EQ(first.next(stop, &image), CaptureStatus::kImage);
+    EXPECT_EQ(image.meta.utime, i * kPeriod_us);
     EXPECT_EQ(image.in.images, i + 1);
   }
 }
@@ -219,7 +236,7 @@ TEST(RecorderOfTwoCameras, EachHasItsChannelAndSizeAndOlderImagesComeFirst) {
   calibration.cameras[1].width = 4;
   calibration.cameras[0].height = calibration.cameras[1].height = 2;
   {
-    Recorder recorder(path, calibration);
+    Recorder recorder(path, {}, calibration);
     const ipc::GreyImage left{6, 2, std::vector<std::uint8_t>(12, 1)};
     const ipc::GreyImage right{4, 2, std::vector<std::uint8_t>(8, 2)};
     recorder.offer(1, right, {.utime = 150, .sequence = 8, .exposure_us = 42, .gain = 3.0F});

@@ -32,8 +32,8 @@ class HandMadeSource final : public CaptureSource {
       return CaptureStatus::kEnd;
     }
     image->image = pictures_[static_cast<std::size_t>(given_ % kPictures)];
-    image->utime = 1'000'000 + given_ * 100'000;
-    image->sequence = given_++;
+    image->meta.utime = 1'000'000 + given_ * 100'000;
+    image->meta.sequence = given_++;
     image->in = {};
     image->in.images = given_;
     image->due_s = steady_s();

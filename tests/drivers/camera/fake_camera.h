@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -45,6 +46,7 @@ class FakeCamera {
   void pass(std::int64_t us);
 
   bool plugged = true;
+  std::function<void()> on_open, on_close;  // while the device opens and closes
   std::vector<drivers::CameraFormat> formats{drivers::CameraFormat::kGrey};
   int width_px = 64, height_px = 48;
   int stride_padding = 0;   // bytes

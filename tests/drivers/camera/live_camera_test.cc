@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 
 #include "tests/drivers/camera/live_camera_fixture.h"
 #include "tests/ipc/allocations.h"
@@ -249,13 +250,56 @@ TEST_P(LiveCameraTest, ASystemTimeThatJumpsMovesNoImage) {
 
 TEST_P(LiveCameraTest, AStampOfNoClockGivesTheTimeOfArrivalAndIsCounted) {
   start();
-  for (const std::int64_t stamp_us : {0, 42}) {
+  constexpr std::int64_t kHuge = std::numeric_limits<std::int64_t>::max();
+  for (const std::int64_t stamp_us : {std::int64_t{0}, std::int64_t{42}, std::int64_t{-1}, -kHuge, kHuge,
+                                      std::int64_t{0x5DEECE66DABCDEF}}) {
     fake_->pass(kPeriod_us);
     ASSERT_TRUE(fake_->show({.stamp_us = stamp_us}));
     ASSERT_TRUE(next());
     EXPECT_NEAR(static_cast<double>(frame_.utime), static_cast<double>(fake_->now.monotonic_us), 2000.0);
   }
-  EXPECT_EQ(camera_->counts().times_unknown, 2);
+  EXPECT_EQ(camera_->counts().times_unknown, 6);
+}
+
+// Stamps that are late by up to 1.9 s, in no order.
+TEST_P(LiveCameraTest, StampsThatJitterCostAFewImagesThenTheTimeOfArrivalStandsInUntilTheNextStream) {
+  start();
+  constexpr std::uint32_t kFrames = 135;
+  std::uint32_t random = 1, taken = 0;
+  std::int64_t last = 0;
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    fake_->pass(kPeriod_us);
+    random = 1664525 * random + 1013904223;
+    ASSERT_TRUE(fake_->show({.sequence = i, .stamp_us = fake_->now.monotonic_us - random % 1'900'000}));
+    if (!next()) continue;
+    ++taken;
+    EXPECT_GT(frame_.utime, last);
+    last = frame_.utime;
+  }
+  EXPECT_GE(taken, kFrames - 8);
+  EXPECT_EQ(camera_->counts().times_backwards, kFrames - taken);
+  EXPECT_GE(camera_->counts().times_unknown, kFrames - 32);
+  const std::int64_t unknown = camera_->counts().times_unknown;
+  fake_->fail_stream();
+  EXPECT_FALSE(next());
+  for (int i = 0; i < 20 && !camera_->is_streaming(); ++i) EXPECT_FALSE(next());
+  ASSERT_TRUE(show(0));
+  EXPECT_TRUE(next());
+  EXPECT_EQ(camera_->counts().times_unknown, unknown);
+}
+
+TEST_P(LiveCameraTest, ImagesThatComeTwiceCastNoDoubtOnTheStamps) {
+  start();
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    fake_->pass(kPeriod_us);
+    const std::int64_t stamp_us = fake_->now.monotonic_us;
+    ASSERT_TRUE(fake_->show({.sequence = 2 * i, .stamp_us = stamp_us}));
+    ASSERT_TRUE(fake_->show({.sequence = 2 * i + 1, .stamp_us = stamp_us}));
+    EXPECT_TRUE(next());
+    EXPECT_FALSE(next());
+  }
+  EXPECT_EQ(camera_->counts().times_backwards, 20);
+  EXPECT_EQ(camera_->counts().times_unknown, 0);
 }
 
 TEST_P(LiveCameraTest, ATimeThatIsNotLaterIsDroppedAndCounted) {
@@ -340,6 +384,32 @@ TEST_P(LiveCameraTest, ACameraThatStopsWithoutAnErrorIsStartedAnew) {
   EXPECT_EQ(camera_->counts().stalled, 1);
   EXPECT_GT(fake_->streams, streams);
   EXPECT_EQ(kinds(), (std::vector{Kind::kStreaming, Kind::kStalled, Kind::kStreaming}));
+}
+
+TEST_P(LiveCameraTest, OpeningAndClosingShowWhenTheyBeganWhileTheyLast) {
+  make();
+  std::vector<std::int64_t> opening, closing;
+  std::int64_t opened_us = 0, closed_us = 0;
+  fake_->on_open = [&] {
+    opened_us = fake_->now.monotonic_us;
+    fake_->pass(3'000'000);
+    opening.push_back(camera_->opening_since_us());
+  };
+  fake_->on_close = [&] {
+    closed_us = fake_->now.monotonic_us;
+    fake_->pass(3'000'000);
+    closing.push_back(camera_->opening_since_us());
+  };
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  EXPECT_FALSE(next());
+  ASSERT_TRUE(camera_->is_streaming());
+  EXPECT_EQ(opening, std::vector{opened_us});
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  fake_->fail_stream();
+  EXPECT_FALSE(next());
+  EXPECT_EQ(closing, std::vector{closed_us});
+  EXPECT_EQ(camera_->opening_since_us(), drivers::Camera::kNotOpening);
+  fake_->on_close = nullptr;  // the fixture's end closes too
 }
 
 // ---- exposure

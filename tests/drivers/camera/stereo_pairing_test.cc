@@ -35,8 +35,8 @@ TEST(StereoPairing, PartnersWithinTheToleranceArePairs) {
     const auto frames = drain(&pairing, 112'000);
     ASSERT_EQ(frames.size(), 1U) << apart_us;
     ASSERT_TRUE(frames[0].is_pair());
-    EXPECT_EQ(frames[0].left->slot, 1U);
-    EXPECT_EQ(frames[0].right->slot, 2U);
+    EXPECT_EQ(frames[0].left->sequence, 1);
+    EXPECT_EQ(frames[0].right->sequence, 2);
     EXPECT_EQ(frames[0].utime(), 100'000);
     EXPECT_EQ(pairing.counts().pairs, 1);
     EXPECT_FALSE(pairing.due_us());
@@ -107,18 +107,18 @@ TEST(StereoPairing, WhateverTheCamerasLoseAllElseFindsItsPartner) {
   struct Arrival {
     std::int64_t at_us;
     Side side;
-    StereoImage image;
+    CameraFrame image;
   };
   for (unsigned int seed = 0; seed < 50; ++seed) {
     std::mt19937 random(seed);
     std::uniform_int_distribution<std::int64_t> jitter_us(-2000, 2000), latency_us(1000, 15'000);
     std::bernoulli_distribution lost(0.1);
     std::vector<Arrival> arrivals;
-    std::set<std::uint32_t> left, right;
-    for (std::uint32_t i = 1; i <= 300; ++i) {
+    std::set<std::int64_t> left, right;
+    for (std::int64_t i = 1; i <= 300; ++i) {
       const std::int64_t at_us = i * kPeriod_us;
       for (const Side side : {Side::kLeft, Side::kRight}) {
-        const StereoImage image{at_us + jitter_us(random), i};
+        const CameraFrame image{at_us + jitter_us(random), i};
         const std::int64_t came_us = image.utime + latency_us(random);
         if (lost(random)) continue;
         (side == Side::kLeft ? left : right).insert(i);
@@ -138,24 +138,24 @@ TEST(StereoPairing, WhateverTheCamerasLoseAllElseFindsItsPartner) {
     }
     for (const StereoFrame& frame : drain(&pairing, 1LL << 60)) frames.push_back(frame);
 
-    std::set<std::uint32_t> seen_left, seen_right;
+    std::set<std::int64_t> seen_left, seen_right;
     std::int64_t pairs = 0, last_us = 0;
     for (const StereoFrame& frame : frames) {
       EXPECT_GT(frame.utime(), last_us);
       last_us = frame.utime();
       if (frame.left) {
-        EXPECT_TRUE(seen_left.insert(frame.left->slot).second);
+        EXPECT_TRUE(seen_left.insert(frame.left->sequence).second);
       }
       if (frame.right) {
-        EXPECT_TRUE(seen_right.insert(frame.right->slot).second);
+        EXPECT_TRUE(seen_right.insert(frame.right->sequence).second);
       }
       if (!frame.is_pair()) continue;
-      EXPECT_EQ(frame.left->slot, frame.right->slot);
+      EXPECT_EQ(frame.left->sequence, frame.right->sequence);
       ++pairs;
     }
     EXPECT_EQ(seen_left, left);
     EXPECT_EQ(seen_right, right);
-    std::vector<std::uint32_t> both;
+    std::vector<std::int64_t> both;
     std::set_intersection(left.begin(), left.end(), right.begin(), right.end(), std::back_inserter(both));
     EXPECT_EQ(pairs, static_cast<std::int64_t>(both.size()));
     EXPECT_EQ(pairing.counts().pairs, pairs);

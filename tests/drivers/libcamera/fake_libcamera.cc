@@ -102,12 +102,14 @@ int FakeLibcamera::System::open(const char* name, drivers::FinishedRequests* fin
   if (camera_->busy) return -EBUSY;
   camera_->finished = finished;
   ++camera_->opened;
+  if (camera_->on_open) camera_->on_open();
   return 0;
 }
 
 void FakeLibcamera::System::close() {
   if (camera_->finished == nullptr) return;
   ++camera_->closed;
+  if (camera_->on_close) camera_->on_close();
   // What is queued comes back cancelled, as libcamera's stop() does it.
   for (const std::uint32_t request : camera_->queued_) {
     camera_->frames_[request].status = LibcameraFrame::Status::kCancelled;

@@ -55,9 +55,9 @@ class FakeV4l2::System final : public drivers::V4l2System {
   [[nodiscard]] void* map(int fd, std::size_t bytes, std::int64_t offset) override;
   void unmap(void* memory, std::size_t bytes) override;
   // At once: threads are ControlWriter's affair.
-  [[nodiscard]] bool start_controls(int fd, std::span<const drivers::ControlValue> controls) override;
-  [[nodiscard]] std::span<const drivers::ControlValue> finished_controls() override;
-  void wait_for_controls() override { static_cast<void>(finished_controls()); }
+  [[nodiscard]] bool start_controls(drivers::ControlJob* job) override;
+  [[nodiscard]] bool finished_controls() override { return std::exchange(job_done_, false); }
+  void wait_for_controls() override { job_done_ = false; }
 
  private:
   int list_format(v4l2_fmtdesc* entry);
@@ -73,8 +73,7 @@ class FakeV4l2::System final : public drivers::V4l2System {
   [[nodiscard]] std::size_t buffer_bytes() const { return camera_->set_.sizeimage; }
 
   FakeV4l2* camera_;
-  std::array<drivers::ControlValue, drivers::ControlWriter::kMost> controls_;
-  std::size_t controls_set_ = 0;  // and not yet asked for
+  bool job_done_ = false;  // and not reported yet
 };
 
 // --- what tests ask for
@@ -118,11 +117,13 @@ bool FakeV4l2::is_readable(int fd) const {
 int FakeV4l2::System::open(const char* path) {
   if (!camera_->plugged || std::strcmp(path, kPath) != 0) return -ENOENT;
   ++camera_->opened;
+  if (camera_->on_open) camera_->on_open();
   return kFd;
 }
 
 void FakeV4l2::System::close(int) {
   ++camera_->closed;
+  if (camera_->on_close) camera_->on_close();
   camera_->queued_.clear();
   camera_->images_.clear();
 }
@@ -183,17 +184,11 @@ int FakeV4l2::System::ioctl(int, unsigned long request, void* argument) {
   }
 }
 
-bool FakeV4l2::System::start_controls(int fd, std::span<const drivers::ControlValue> controls) {
-  if (controls_set_ > 0) return false;
-  for (const drivers::ControlValue& wanted : controls) {
-    v4l2_control argument{wanted.id, wanted.value};
-    controls_.at(controls_set_++) = {wanted.id, wanted.value, ioctl(fd, VIDIOC_S_CTRL, &argument) >= 0};
-  }
+bool FakeV4l2::System::start_controls(drivers::ControlJob* job) {
+  if (job_done_) return false;
+  job->run();
+  job_done_ = true;
   return true;
-}
-
-std::span<const drivers::ControlValue> FakeV4l2::System::finished_controls() {
-  return std::span(controls_).first(std::exchange(controls_set_, 0));
 }
 
 const CameraFormat* FakeV4l2::System::find(std::uint32_t code) const {
@@ -261,7 +256,7 @@ int FakeV4l2::System::dequeue(v4l2_buffer* buffer) {
   buffer->bytesused = static_cast<std::uint32_t>(image.filled.bytes);
   buffer->sequence = image.sequence;
   buffer->flags = image.flags;
-  buffer->timestamp.tv_sec = image.stamp_us / 1'000'000;
+  buffer->timestamp.tv_sec = camera_->stamp_s.value_or(image.stamp_us / 1'000'000);
   buffer->timestamp.tv_usec = image.stamp_us % 1'000'000;
   return 0;
 }

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -30,6 +31,7 @@ class FakeV4l2 final : public FakeCamera {
   bool takes_other_size = false;                                // S_FMT changes what was asked for
   std::map<drivers::CameraFormat, double> fastest_hz;           // 30 where it does not say
   std::uint32_t flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;      // of each image
+  std::optional<std::int64_t> stamp_s;                          // seconds of each stamp, whatever was shown
   std::map<std::uint32_t, std::pair<int, int>> control_ranges;  // that it has
   std::map<std::uint32_t, int> controls;                        // as set
 

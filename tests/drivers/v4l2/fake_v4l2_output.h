@@ -99,8 +99,8 @@ class FakeOutputSystem final : public drivers::V4l2System {
         return -ENOTTY;
     }
   }
-  [[nodiscard]] bool start_controls(int, std::span<const drivers::ControlValue>) override { return false; }
-  [[nodiscard]] std::span<const drivers::ControlValue> finished_controls() override { return {}; }
+  [[nodiscard]] bool start_controls(drivers::ControlJob* /*job*/) override { return false; }
+  [[nodiscard]] bool finished_controls() override { return false; }
   void wait_for_controls() override {}
 
  private:

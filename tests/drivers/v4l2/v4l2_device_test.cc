@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/drivers/camera/live_camera_fixture.h"
 #include "tests/drivers/v4l2/fake_v4l2.h"
 
@@ -101,6 +103,19 @@ TEST_F(V4l2DeviceTest, TheStampOfALoopbackDeviceIsTheImagesTimeAlready) {
     ASSERT_TRUE(next());
     EXPECT_EQ(frame_.utime, expected_us);
   }
+}
+
+TEST_F(V4l2DeviceTest, SecondsThatNoMicrosecondsCanHoldGiveTheTimeOfArrival) {
+  start();
+  for (const std::int64_t stamp_s :
+       {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+    fake_->pass(33'000);
+    fake_->stamp_s = stamp_s;
+    ASSERT_TRUE(show(static_cast<std::uint32_t>(frame_.sequence + 1)));
+    ASSERT_TRUE(next());
+    EXPECT_NEAR(static_cast<double>(frame_.utime), static_cast<double>(fake_->now.monotonic_us), 2000.0);
+  }
+  EXPECT_EQ(camera_->counts().times_unknown, 2);
 }
 
 // ---- coming and going

@@ -14,12 +14,13 @@ IMAGE = struct.Struct(">qqiifiiiii")
 CAMERA = struct.Struct(">ii4d5d3d4ddd")
 
 # status_t behind its fingerprint, as far as it is read here.
-STATUS = struct.Struct(">qbbdbii22qb")
+STATUS = struct.Struct(">qbbdbii24qb")
 STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter",
                 "frames_received", "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped",
                 "deadlines_missed",
                 "images_wrong_size", "images_undecodable", "images_missing", "images_flagged", "camera_losses",
-                "stereo_pairs", "stereo_left_alone", "stereo_right_alone", "images_unknown_camera", "times_backwards", "messages_undecodable", "log_damages", "imu_invalid",
+                "stereo_pairs", "stereo_left_alone", "stereo_right_alone", "stereo_skew_us", "images_unknown_camera",
+                "times_backwards", "times_unknown", "messages_undecodable", "log_damages", "imu_invalid",
                 "can_send_errors", "can_bus_offs", "can_received", "can_state")
 # wheels_t behind its fingerprint, before the wheels: utime, speed, its sigma, yaw rate, steering angle, how many.
 WHEELS = struct.Struct(">qddddi")
