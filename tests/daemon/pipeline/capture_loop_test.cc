@@ -20,7 +20,7 @@ class ScriptedSource final : public CaptureSource {
     const std::size_t turn = turns_++;
     if (turn == turns.size()) return CaptureStatus::kEnd;
     image->in.images = static_cast<std::int64_t>(100 + turn);
-    if (turns[turn] == CaptureStatus::kImage) image->sequence = static_cast<std::int64_t>(turn);
+    if (turns[turn] == CaptureStatus::kImage) image->meta.sequence = static_cast<std::int64_t>(turn);
     return turns[turn];
   }
   std::vector<CaptureStatus> turns;
@@ -50,7 +50,7 @@ TEST_F(CaptureLoopTest, QueuesEachImageInOrderAndClosesTheQueue) {
   for (const int sequence : {0, 2}) {
     CapturedImage* image = images_.pop();
     ASSERT_NE(image, nullptr);
-    EXPECT_EQ(image->sequence, sequence);
+    EXPECT_EQ(image->meta.sequence, sequence);
     images_.give_back(image);
   }
   EXPECT_EQ(images_.pop(), nullptr);

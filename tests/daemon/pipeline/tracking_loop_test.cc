@@ -13,8 +13,8 @@ class TrackingLoopTest : public SessionFixture {
   void queue(int number) {
     CapturedImage* image = images_.begin_push();
     image->image = grey(number);
-    image->utime = 1'000'000 + number * 100'000;
-    image->sequence = number;
+    image->meta.utime = 1'000'000 + number * 100'000;
+    image->meta.sequence = number;
     image->in.images = number + 1;
     image->due_s = 50.0 + number;
     image->decode_cpu_ms = 1.5;
