@@ -80,7 +80,7 @@ std::string lcm_url_problem(const std::string& url) {
   const std::size_t colon = network.find(':');
   in_addr address{};
   const bool has_address = inet_pton(AF_INET, network.substr(0, colon).c_str(), &address) == 1;
-  const bool has_port = colon == std::string::npos || is_port(std::string_view(network).substr(colon + 1));
+  const bool has_port = colon == std::string::npos || is_port(network.substr(colon + 1));
   return has_address && has_port ? "" : "expected a group and a port such as 239.255.76.67:7667";
 }
 

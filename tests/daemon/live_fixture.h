@@ -42,8 +42,8 @@ class FilmCamera final : public drivers::Camera {
   void lose_stamps() { loses_stamps_ = true; }
   // Its first opening takes this long.
   void open_slowly(double takes_s) { opening_takes_s_ = takes_s; }
-  // One shutter for both: image n of the other is taken `later_us` after image n of this one. Images due while
-  // a camera is away never come.
+  // One shutter for both: image n of the other is taken `later_us` after image n of this one. Images due
+  // while a camera is away never come.
   void share_shutter_with(FilmCamera* other, std::int64_t later_us) {
     other->shutter_ = shutter_ = std::make_shared<std::atomic<double>>(-1.0);
     other->later_us_ = later_us;
