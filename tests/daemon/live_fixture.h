@@ -147,10 +147,12 @@ class LiveRunTest : public testing::Test {
     };
     environment.hooks = hooks_;
     testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
     const int status = live(
         options_, config_, [this] { return reloaded_; }, std::move(environment));
     stop_took_s_ = steady_s() - stopped_s_;
     printed_ = testing::internal::GetCapturedStdout();
+    said_ = printed_ + testing::internal::GetCapturedStderr();
     return status;
   }
 
@@ -174,7 +176,8 @@ class LiveRunTest : public testing::Test {
   std::atomic<slam::State> last_seen_state_{slam::State::kStarting};
   std::vector<FrameOutput> silent_;  // output's thread, read after the run
   double stopped_s_ = 0, stop_took_s_ = 0;
-  std::string printed_;
+  std::string printed_;  // on standard output
+  std::string said_;     // and on standard error: where the log goes, another test may have chosen
 };
 
 }  // namespace farpoint::daemon

@@ -119,11 +119,11 @@ TEST_F(Live, StampsOfNoClockAreCountedInTheStatusAndSaidInTheLogNowAndThen) {
   const auto status = test::messages_of<status_t>(options_.output, ipc::kStatusChannel);
   ASSERT_FALSE(status.empty());
   EXPECT_GE(status.back().times_unknown, 45);
-  const std::string said = "camera /dev/video0: ";
-  const std::size_t first = printed_.find(said);
-  ASSERT_NE(first, std::string::npos) << printed_;
-  EXPECT_NE(printed_.find("images with a time stamp of no clock", first), std::string::npos) << printed_;
-  EXPECT_EQ(printed_.find(said, first + 1), std::string::npos) << printed_;  // 2 s: once
+  const std::string camera = "camera /dev/video0: ";
+  const std::size_t first = said_.find(camera);
+  ASSERT_NE(first, std::string::npos) << said_;
+  EXPECT_NE(said_.find("images with a time stamp of no clock", first), std::string::npos) << said_;
+  EXPECT_EQ(said_.find(camera, first + 1), std::string::npos) << said_;  // 2 s: once
 }
 
 TEST_F(Live, WithoutACameraItIsReadyAliveAndSaysSo) {
@@ -153,8 +153,7 @@ TEST_F(Live, ACameraThatTakesLongToOpenIsNoHang) {
     meanwhile += text.starts_with("WATCHDOG=1") && time_s > began_s + 0.5 && time_s < began_s + 2.4 ? 1 : 0;
   EXPECT_GE(meanwhile, 10);
   EXPECT_GE(silent_.size(), 5U);  // meanwhile: no camera
-  EXPECT_NE(printed_.find("camera /dev/video0: opening or closing it has taken"), std::string::npos)
-      << printed_;
+  EXPECT_NE(said_.find("camera /dev/video0: opening or closing it has taken"), std::string::npos) << said_;
 }
 
 TEST_F(Live, ACameraThatOpensForLongerThanItsLimitIsAHang) {
