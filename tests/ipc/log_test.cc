@@ -98,6 +98,22 @@ TEST(Log, ReadsImagesLargerThanItsBuffer) {
   EXPECT_EQ(damage.places, 0U);
 }
 
+TEST(Log, AnEventLongerThanTheReadersLimitCountsAsDamage) {
+  const test::Scratch scratch;
+  const std::string path = scratch.path("a.lcm");
+  LogWriter writer(path);
+  for (const std::size_t bytes : {std::size_t{100}, std::size_t{5} << 20, std::size_t{200}})
+    ASSERT_TRUE(writer.write("A", 0, Bytes(bytes, 7)));
+  writer.close();
+  LogReader reader(path, std::size_t{5} << 20);
+  EXPECT_EQ(read_all(reader).size(), 3U) << "as long as the limit";
+  LogReader strict(path, (std::size_t{5} << 20) - 1);
+  const std::vector<Event> events = read_all(strict);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[1].data.size(), 200U);
+  EXPECT_EQ(strict.damage().places, 1U);
+}
+
 TEST(Log, OffsetPointsAtTheSyncWord) {
   const test::Scratch scratch;
   write_log(scratch.path("a.lcm"), 20, 100);

@@ -259,6 +259,64 @@ TEST_F(LogSourceTest, ImagesTheCalibrationDoesNotKnowAreDropped) {
   EXPECT_EQ(counts_.others, 2U);
 }
 
+TEST_F(LogSourceTest, ImagesBeyondTheLimitAreDropped) {
+  constexpr std::int64_t kPixels = kWidth_px * kHeight_px;
+  {
+    ipc::LogWriter log(scratch_.path("a.lcm"));
+    log.write_message("CAMERA_0", 0, make_image(1));
+    image_t padded = make_image(2);
+    padded.data.resize(100'000);
+    padded.size = 100'000;
+    log.write_message("CAMERA_0", 0, padded);
+    log.write_message("CAMERA_0", 0, make_image(3));
+    log.close();
+  }
+  for (const bool fits : {true, false}) {
+    LogSource source(scratch_.path("a.lcm"), fits ? kPixels : kPixels - 1);
+    LogItem item;
+    ipc::GreyImage grey;
+    std::uint64_t images = 0;
+    for (; source.next(&item); ++images)
+      EXPECT_EQ(source.decode(item, &grey), fits ? ipc::ImageStatus::kOk : ipc::ImageStatus::kTooLarge);
+    EXPECT_EQ(images, 2U);
+    EXPECT_EQ(source.counts().images_wrong_size, 1U) << "the message is longer than any such image";
+    EXPECT_EQ(source.counts().images_undecodable, fits ? 0U : 2U);
+  }
+}
+
+TEST_F(LogSourceTest, ImagesOfOtherCamerasComeWithoutTheirData) {
+  {
+    ipc::LogWriter log(scratch_.path("a.lcm"));
+    log.write_message("CALIBRATION", 0, make_calibration(2));
+    for (std::int64_t utime = 100; utime < 1000; utime += 100) {
+      log.write_message("CAMERA_0", 0, make_image(utime, 0));
+      log.write_message("CAMERA_1", 0, make_image(utime + 7, 1));
+    }
+    log.close();
+  }
+  LogSource all(scratch_.path("a.lcm")), first(scratch_.path("a.lcm"), ipc::kMaxImagePixels, 0);
+  LogItem of_all, of_first;
+  ipc::GreyImage grey;
+  int images = 0;
+  while (all.next(&of_all)) {
+    ASSERT_TRUE(first.next(&of_first));
+    EXPECT_EQ(of_all.kind, of_first.kind);
+    EXPECT_EQ(of_all.utime, of_first.utime);
+    if (of_all.kind != LogItemKind::kImage) continue;
+    ++images;
+    ASSERT_EQ(of_all.camera, of_first.camera);
+    EXPECT_EQ(of_first.image->utime, of_first.utime);
+    if (of_first.camera == 0) {
+      ASSERT_EQ(first.decode(of_first, &grey), ipc::ImageStatus::kOk);
+      EXPECT_EQ(grey.pixels, make_image(of_first.utime).data);
+    } else {
+      EXPECT_TRUE(of_first.image->data.empty());
+    }
+  }
+  EXPECT_FALSE(first.next(&of_first));
+  EXPECT_EQ(images, 18);
+}
+
 TEST_F(LogSourceTest, InvalidNumbersAreDropped) {
   const auto items = read([](ipc::LogWriter& log) {
     imu_t imu = make_imu(1);
