@@ -91,23 +91,26 @@ TEST(RecordedThreads, NoHeapOnEurocAfterSettling) {
 }
 
 // What a recording shows instead of its images.
-enum class Disturbance : std::uint8_t { kNone, kBlack, kUpsideDown };
+enum class Disturbance : std::uint8_t { kNone, kBlack, kMirrored };
 
-// Three dark stretches that end in the same map, and two changes of place: upside down, and back.
+// Three dark stretches that end in the same map, and two changes of place: mirrored, and back. Descriptors
+// would find an image that is upside down.
 Disturbance disturbance_at(double time_s) {
-  for (const double dark_s : {3.4, 5.0, 6.6})
+  for (const double dark_s : {3.2, 4.6, 6.0})
     if (time_s >= dark_s && time_s < dark_s + 0.6) return Disturbance::kBlack;
-  return time_s >= 8.0 && time_s < 12.5 ? Disturbance::kUpsideDown : Disturbance::kNone;
+  return time_s >= 7.5 && time_s < 12.0 ? Disturbance::kMirrored : Disturbance::kNone;
 }
 
 void disturb(image_t* image, Disturbance disturbance) {
   ipc::ImageDecoder decoder;
   ipc::GreyImage grey;
   ASSERT_EQ(decoder.decode(*image, &grey), ipc::ImageStatus::kOk);
-  if (disturbance == Disturbance::kBlack)
-    std::fill(grey.pixels.begin(), grey.pixels.end(), std::uint8_t{0});
-  else
-    std::reverse(grey.pixels.begin(), grey.pixels.end());
+  for (auto row = grey.pixels.begin(); row != grey.pixels.end(); row += grey.width_px) {
+    if (disturbance == Disturbance::kBlack)
+      std::fill(row, row + grey.width_px, std::uint8_t{0});
+    else
+      std::reverse(row, row + grey.width_px);
+  }
   image->pixel_format = image_t::PIXEL_FORMAT_GREY;
   image->row_stride = 0;
   image->data.assign(grey.pixels.begin(), grey.pixels.end());
