@@ -2,6 +2,7 @@
 #include "daemon/config/config.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -225,6 +226,37 @@ std::string read_file(const std::string& path) {
   return text;
 }
 
+// Notes where documents begin. YAML::LoadAll() does not end for some texts, such as one that begins with a
+// comma.
+class Documents final : public YAML::EventHandler {
+ public:
+  // Places of the first two.
+  std::vector<YAML::Mark> starts;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { starts.push_back(mark); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  }
+  void OnMapEnd() override {}
+};
+
+// The file's document; undefined for an empty file.
+YAML::Node load_document(const std::string& text, const std::string& file_name) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  Documents documents;
+  if (parser.HandleNextDocument(documents)) parser.HandleNextDocument(documents);
+  if (documents.starts.size() > 1)
+    fail(file_name + ":" + std::to_string(documents.starts[1].line + 1), "a second document, expected one");
+  return YAML::Load(text);
+}
+
 std::string place_of(const std::string& key, const ConfigOrigins& origins) {
   const auto set_at = origins.find(key);
   return set_at == origins.end() ? "built-in defaults" : set_at->second;
@@ -270,21 +302,18 @@ void load_config_file(const std::string& path, Config* config, ConfigOrigins* or
 void load_config_text(const std::string& text, const std::string& file_name, Config* config,
                       ConfigOrigins* origins, std::vector<std::string>* warnings,
                       std::span<const DroppedKey> dropped) {
-  std::vector<YAML::Node> documents;
+  YAML::Node document;
   try {
-    documents = YAML::LoadAll(text);
+    document = load_document(text, file_name);
   } catch (const YAML::Exception& error) {
     fail(file_name + ":" + std::to_string(error.mark.line + 1),
          "not YAML: " + error.msg + ", expected 'section:' and 'key: value' lines");
   }
-  if (documents.size() > 1) {
-    fail(file_name + ":" + std::to_string(documents[1].Mark().line + 1), "a second document, expected one");
-  }
-  if (documents.empty() || documents[0].IsNull()) return;
+  if (!document.IsDefined() || document.IsNull()) return;
   FileReader reader(file_name, config, origins, warnings, dropped);
-  if (!documents[0].IsMap())
-    fail(reader.place(documents[0]), "not a map, expected 'section:' and 'key: value' lines");
-  reader.read_section(documents[0], "");
+  if (!document.IsMap())
+    fail(reader.place(document), "not a map, expected 'section:' and 'key: value' lines");
+  reader.read_section(document, "");
 }
 
 void apply_setting(const std::string& assignment, Config* config, ConfigOrigins* origins) {

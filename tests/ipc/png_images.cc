@@ -61,15 +61,15 @@ std::vector<std::uint8_t> to_png(std::span<const std::uint8_t> pixels, int width
       },
       nullptr);
   const Layout layout = layout_of(kind);
-  png_set_IHDR(png, info, png_uint_32(width_px), png_uint_32(height_px), layout.depth, layout.type,
-               is_interlaced(kind) ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width_px), static_cast<png_uint_32>(height_px),
+               layout.depth, layout.type, is_interlaced(kind) ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
   const std::size_t row_bytes = png_get_rowbytes(png, info);
-  std::vector<png_bytep> rows;
-  for (int v = 0; v < height_px; ++v)
-    rows.push_back(const_cast<png_bytep>(pixels.data()) + static_cast<std::size_t>(v) * row_bytes);
-  png_write_image(png, rows.data());
+  const int passes = png_set_interlace_handling(png);
+  for (int pass = 0; pass < passes; ++pass)
+    for (int v = 0; v < height_px; ++v)
+      png_write_row(png, pixels.subspan(static_cast<std::size_t>(v) * row_bytes, row_bytes).data());
   png_write_end(png, nullptr);
   png_destroy_write_struct(&png, &info);
   return out;
@@ -91,14 +91,14 @@ void put_png_chunk(const std::string& name, const std::vector<std::uint8_t>& con
 std::vector<std::uint8_t> deflated_zeros(std::size_t bytes) {
   z_stream stream{};
   deflateInit(&stream, Z_BEST_COMPRESSION);
-  const Bytes zeros(std::size_t{1} << 20, 0);
+  Bytes zeros(std::size_t{1} << 20, 0);
   std::array<std::uint8_t, 65536> piece{};
   Bytes out;
   std::size_t left = bytes;
   do {
     const std::size_t now = std::min(left, zeros.size());
     left -= now;
-    stream.next_in = const_cast<Bytef*>(zeros.data());
+    stream.next_in = zeros.data();
     stream.avail_in = static_cast<uInt>(now);
     do {
       stream.next_out = piece.data();

@@ -192,6 +192,12 @@ TEST(ConfigMistakes, WrongTypeSaysWhatWasExpected) {
   EXPECT_EQ(error_of("lcm:\n  url: ''\n"), "f.yaml:2: lcm.url: '', expected text");
 }
 
+// Found by a fuzzer: the library's LoadAll() never came back.
+TEST(ConfigMistakes, TextThatIsNoYamlIsRefusedAndEnds) {
+  EXPECT_EQ(error_of(",trackingP.\n  min_inliers: 12\n"), "f.yaml:1: a second document, expected one");
+  EXPECT_NE(error_of(","), "");
+}
+
 TEST(ConfigMistakes, OutOfRange) {
   EXPECT_EQ(error_of("pyramid:\n  levels: 0\n"),
             "f.yaml:2: pyramid.levels: '0', expected an integer from 1 to 16 (levels)");
@@ -219,7 +225,7 @@ TEST(ConfigMistakes, MalformedYaml) {
       << error_of("log:\n\tlevel: info\n");
   EXPECT_EQ(error_of("- a\n- b\n"), "f.yaml:1: not a map, expected 'section:' and 'key: value' lines");
   EXPECT_EQ(error_of("log:\n  level: info\n---\nlog:\n  level: info\n"),
-            "f.yaml:4: a second document, expected one");
+            "f.yaml:3: a second document, expected one");
   EXPECT_EQ(error_of("? [a, b]\n: 1\n"), "f.yaml:1: a key is not a word, expected 'section: key: value'");
   EXPECT_NE(error_of("log: &a\n  level: *b\n"), "");
   EXPECT_NE(error_of(std::string(100000, '[')), "");
