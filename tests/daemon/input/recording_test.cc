@@ -227,6 +227,12 @@ TEST_F(RecordingTest, ARingOfMinutesCountsWhatEarlierRunsLeft) {
   EXPECT_FALSE(names().contains(*before.begin()));
 }
 
+TEST_F(RecordingTest, ARunWithoutAnImageLeavesNoFileInTheRing) {
+  limits_.max_size_mb = 1;
+  EXPECT_EQ(begin()->close(), "");
+  EXPECT_TRUE(names().empty());
+}
+
 TEST_F(RecordingTest, AShareOfTheDiskStaysFree) {
   limits_.max_size_mb = 1;  // files of 0.1 MB
   limits_.min_free_share = 0.1;
