@@ -434,7 +434,7 @@ class RandomDamage : public testing::Test {
 
     const Times intact = log.images(true);
     EXPECT_TRUE(r.outcome.status == 0 || r.outcome.status == 2) << r.outcome.status;
-    EXPECT_TRUE(r.outcome.status == 0 || r.outcome.err_lines() == 1) << r.outcome.err;
+    EXPECT_EQ(r.outcome.error_lines(), r.outcome.status == 0 ? 0 : 1) << r.outcome.err;
     // A calibration that is not what it was may know no such camera or another size.
     if (!log.calibration_intact()) return;
     if (!intact.empty()) {

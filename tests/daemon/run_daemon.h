@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,13 @@ struct Outcome {
   int status = -1;
   std::string out, err;
   [[nodiscard]] long err_lines() const { return std::count(err.begin(), err.end(), '\n'); }
+  // Without warnings, which a run may print before the line of its end.
+  [[nodiscard]] long error_lines() const {
+    long lines = 0;
+    std::istringstream in(err);
+    for (std::string line; std::getline(in, line);) lines += line.starts_with("farpointd: warning: ") ? 0 : 1;
+    return lines;
+  }
 };
 
 // Runs the daemon in this process; warnings and errors only on standard error.
