@@ -28,7 +28,8 @@ bool is_digits(std::string_view text) {
 // Name of the file that NAME.partPID becomes; empty for another name.
 std::string name_of_part(const std::string& name) {
   const std::size_t at = name.rfind(kPart);
-  if (at == std::string::npos || !is_digits(std::string_view(name).substr(at + kPart.size()))) return {};
+  const std::string_view whole = name;
+  if (at == std::string::npos || !is_digits(whole.substr(at + kPart.size()))) return {};
   return name.substr(0, at);
 }
 
@@ -72,8 +73,9 @@ std::optional<std::int64_t> RecordingFolder::number_of(const std::string& name) 
   const std::string head = stem_ + "-";
   if (!name.starts_with(head) || !name.ends_with(extension_)) return std::nullopt;
   if (name.size() < head.size() + kDigits + extension_.size()) return std::nullopt;
+  const std::string_view whole_name = name;
   const std::string_view digits =
-      std::string_view(name).substr(head.size(), name.size() - head.size() - extension_.size());
+      whole_name.substr(head.size(), name.size() - head.size() - extension_.size());
   std::int64_t number = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
   const bool whole = is_digits(digits) && error == std::errc{} && end == digits.data() + digits.size();
