@@ -33,7 +33,8 @@ std::size_t big_endian(const std::uint8_t* bytes) {
 SocketCamera::SocketCamera(const CameraOptions& options)
     : options_(options),
       channel_(ipc::kCameraChannelPrefix + std::to_string(options.index)),
-      buffer_(largest_event(options)) {}
+      buffer_(largest_event(options)),
+      decoder_(std::int64_t{options.width_px} * options.height_px) {}
 
 std::string SocketCamera::check(const std::string& name) {
   const std::string expected =

@@ -109,7 +109,7 @@ bool LogCamera::begin_again() {
   log_utime_.reset();
   loop_offset_us_.reset();
   try {
-    source_.emplace(options_.device);
+    source_.emplace(options_.device, std::int64_t{options_.width_px} * options_.height_px, options_.index);
   } catch (const std::runtime_error&) {
     source_.reset();
   }

@@ -82,6 +82,17 @@ TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
       has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone   skew -1.2 ms\n"));
 }
 
+TEST(Top, FunctionsThatHaveNotBegunAreNamed) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  board.take(s, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "attempts failed"));
+  s.side_missing = int{status_t::SIDE_LCM} | int{status_t::SIDE_RECORDING};
+  s.side_failures = 12;
+  board.take(s, 100.2);
+  EXPECT_TRUE(has(board.render(100.3, false), "missing   LCM, recording   12 attempts failed\n"));
+}
+
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {
   Board board;
   board.take(status_of(status_t::STATE_TRACKING), 100.0);

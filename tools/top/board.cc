@@ -29,6 +29,24 @@ const char* colour_of(int state) {
   return kYellow;
 }
 
+// What has not begun, by the bits of status_t.side_missing; at most one line of the board.
+std::string missing_functions(std::int32_t bits) {
+  struct Name {
+    std::int32_t bit;
+    const char* text;
+  };
+  constexpr std::array kNames = {Name{status_t::SIDE_LCM, "LCM"},
+                                 Name{status_t::SIDE_OUTPUT_LOG, "output log"},
+                                 Name{status_t::SIDE_LIVE_TRAJECTORY, "trajectory"},
+                                 Name{status_t::SIDE_CAN_LOG, "CAN log"},
+                                 Name{status_t::SIDE_RECORDING, "recording"},
+                                 Name{status_t::SIDE_LOG_FILE, "log file"}};
+  std::string text;
+  for (const Name& name : kNames)
+    if ((bits & name.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name.text);
+  return text;
+}
+
 void forget_before(double time_s, std::deque<double>* times) {
   while (!times->empty() && times->front() < time_s) times->pop_front();
 }
@@ -163,6 +181,9 @@ std::string Board::count_lines() const {
   text += fmt::format(
       "errors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
       s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);
+  if (s.side_missing != 0)
+    text += fmt::format("missing   {}   {} attempts failed\n", missing_functions(s.side_missing),
+                        s.side_failures);
   if (timing_) {
     text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
                         static_cast<double>(timing_->resident_bytes) / kMegabyte,
