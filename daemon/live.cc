@@ -59,18 +59,21 @@ const std::string& device_of(const CameraConfig& camera, int index) {
   return index == 0 ? camera.device : camera.second_device;
 }
 
+calibration_t calibration_of_cameras(const CameraConfig& camera) {
+  if (camera.calibration == "log") {
+    if (camera.driver == CameraDriverChoice::kFile) return calibration_of_log(camera.device);
+    throw ConfigError(
+        "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
+  }
+  if (camera.has_second()) return read_stereo_calibration(camera.calibration, camera.second_calibration);
+  return calibration_of(read_camera_file(camera.calibration), "camera");
+}
+
 calibration_t read_calibration(const Config& config) {
   if (config.camera.index != 0)
     throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
                       ", expected 0 for a live camera");
-  const CameraConfig& camera = config.camera;
-  if (camera.calibration == "log" && camera.driver != CameraDriverChoice::kFile)
-    throw ConfigError(
-        "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
-  calibration_t calibration = camera.calibration == "log" ? calibration_of_log(camera.device)
-                              : camera.has_second()
-                                  ? read_stereo_calibration(camera.calibration, camera.second_calibration)
-                                  : calibration_of(read_camera_file(camera.calibration), "camera");
+  calibration_t calibration = calibration_of_cameras(config.camera);
   check_image_size(calibration, config);
   return calibration;
 }
@@ -204,11 +207,11 @@ void LiveRun::open_log_file_aside() {
 void LiveRun::open_recorder_aside() {
   if (options_.record.empty()) return;
   side_.begin(SideFunction::kRecording, "--record", [this] {
-    recorder_.set(std::make_unique<Recorder>(options_.record, config_.record, calibration_));
-    Recorder* recorder = recorder_.get();
+    auto recorder = std::make_unique<Recorder>(options_.record, config_.record, calibration_);
     recording_.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, nullptr,
-                       [recorder] { recorder->run(); });
-    for (CameraSource& camera : cameras_) camera.record_to(recorder);
+                       [recorder = recorder.get()] { recorder->run(); });
+    for (CameraSource& camera : cameras_) camera.record_to(recorder.get());
+    recorder_.set(std::move(recorder));
   });
 }
 

@@ -5,6 +5,7 @@ The scenario notes what it did in a file of events, one a line, in seconds of th
 
     blind FROM TO       no image can have been tracked in that time
     silent FROM TO      no daemon runs in that time
+    held FROM TO        the output thread stands still in that time
     stopped AT          an orderly end
     started AT          a start, except the first
 """
