@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matches the images of the first camera and a further one by time. Counts pairs and single images, and
 // measures how far the images of a pair are apart. No image waits for the result, which follows within
-// kPatience_us; at once after the further camera went away. A further camera that has not come yet may still
-// open, so its partners are counted as alone after kPatience_us.
+// kPatience_us. While the further camera is away, each image of the first counts as alone at once. Before the
+// further camera's first image, it counts as alone after kPatience_us.
 #pragma once
 
 #include <cstdint>

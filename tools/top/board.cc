@@ -29,7 +29,7 @@ const char* colour_of(int state) {
   return kYellow;
 }
 
-// What has not begun, by the bits of status_t.side_missing; at most one line of the board.
+// Names the functions whose bits are set in status_t.side_missing.
 std::string missing_functions(std::int32_t bits) {
   struct Name {
     std::int32_t bit;
