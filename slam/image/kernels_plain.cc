@@ -192,7 +192,8 @@ void sample_patch(const float* smooth, const PatchSampling& s, PatchTemplate* ou
   for (int at = 0; at < kTemplateCount; ++at) {
     const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
     const float x = (s.x0 + s.xj * j) + s.xi * i, y = (s.y0 + s.yj * j) + s.yi * i;
-    const int nearest_x = static_cast<int>(x + 0.5F), nearest_y = static_cast<int>(y + 0.5F);
+    const int nearest_x = static_cast<int>(std::floor(x + 0.5F)),
+              nearest_y = static_cast<int>(std::floor(y + 0.5F));
     const SplineWeights wx = spline(x - static_cast<float>(nearest_x)),
                         wy = spline(y - static_cast<float>(nearest_y));
     const float* p = smooth + (nearest_y - 1) * kAlignPatchSide + nearest_x - 1;

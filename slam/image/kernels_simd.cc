@@ -11,8 +11,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace farpoint::slam {
-namespace HWY_NAMESPACE {
+namespace farpoint::slam::HWY_NAMESPACE {
 #if HWY_TARGET == HWY_SCALAR
 // No vectors (x86 before SSSE3): the plain versions serve.
 const Kernels* table() {
@@ -344,8 +343,7 @@ const Kernels* table() {
 }
 #endif  // HWY_TARGET == HWY_SCALAR
 
-}  // namespace HWY_NAMESPACE
-}  // namespace farpoint::slam
+}  // namespace farpoint::slam::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -89,7 +89,7 @@ TrackOutcome Relocaliser::relocalise(const Frame& frame, const Motion& last) {
     const Search& search = k < always.size() ? always[k] : in_turn[next_];
     if (k >= always.size()) next_ = (next_ + 1) % in_turn.size();
     for (int c = 0; c < frame.views.size(); ++c) {
-      const TrackOutcome out = run(frame, c, search, gap_s);
+      TrackOutcome out = run(frame, c, search, gap_s);
       if (out.ok) return out;
     }
   }

@@ -317,7 +317,10 @@ TEST(Kernels, NearWordsAreIdenticalAndRight) {
   constexpr std::size_t kWords = 203, kReadBehind = 16;
   std::vector<std::uint64_t> words(kWords + kReadBehind);
   const std::uint64_t query = rng();
-  for (std::uint64_t& word : words) word = query ^ (rng() & rng());  // a quarter of the bits differ
+  for (std::uint64_t& word : words) {
+    const std::uint64_t some = rng(), others = rng();
+    word = query ^ (some & others);  // a quarter of the bits differ
+  }
   words[0] = query;
   words[kWords - 1] = ~query;
   words[kWords] = query;  // behind the end
