@@ -192,7 +192,7 @@ void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
   const std::optional<RecordedFrame> candidate = recovery_.take_candidate();
   const bool relocalising = search == Recovery::Search::kRelocalise;
   const bool confirming = search == Recovery::Search::kConfirm;
-  const TrackOutcome outcome = relocalising ? tracker_.relocalise(*frame) : tracker_.track(*frame);
+  const TrackOutcome outcome = search_for(*frame, search);
   result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
   result_.matches = outcome.matches;
   result_.inliers = outcome.inliers;
@@ -205,6 +205,18 @@ void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
     if (confirming) record(*candidate);
     note_tracked(frame, outcome);
   }
+}
+
+TrackOutcome FrontEnd::search_for(const Frame& frame, Recovery::Search search) {
+  switch (search) {
+    case Recovery::Search::kRelocalise:
+      return tracker_.relocalise(frame);
+    case Recovery::Search::kConfirm:
+      return tracker_.confirm(frame);
+    case Recovery::Search::kTrack:
+      break;
+  }
+  return tracker_.track(frame);
 }
 
 // The pose is published once the next frame has confirmed it.

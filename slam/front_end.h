@@ -77,6 +77,7 @@ class FrontEnd {
   void initialise(const std::shared_ptr<Frame>& frame);
   void skip_blind_frame();
   void follow(const std::shared_ptr<Frame>& frame);
+  TrackOutcome search_for(const Frame& frame, Recovery::Search search);
   void note_relocalised(const Frame& frame, const TrackOutcome& outcome);
   void note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void note_lost(const std::shared_ptr<Frame>& frame);

@@ -168,11 +168,14 @@ int needed_samples(double inlier_share, int max_samples) {
   return needed >= max_samples ? max_samples : std::max(kMinSamples, static_cast<int>(std::ceil(needed)));
 }
 
-bool find_pose(Bearings bearings, Points points, double sigma_rad, const PnpOptions& options, SE3* best) {
+// Returns how many samples were tried; 0 where none gave a pose.
+int find_pose(Bearings bearings, Points points, double sigma_rad, const PnpOptions& options, SE3* best) {
   SampleGenerator generator(options.seed);
   double best_cost = std::numeric_limits<double>::max();
-  int samples = options.max_samples;
-  for (int k = 0; k < samples; ++k) {
+  const double least_share = std::max(options.min_inlier_share, static_cast<double>(options.min_inliers) /
+                                                                    static_cast<double>(bearings.size()));
+  int samples = needed_samples(least_share, options.max_samples), k = 0;
+  for (; k < samples; ++k) {
     const std::array<size_t, 3> chosen = generator.sample<3>(bearings.size());
     const std::array<Eigen::Vector3d, 3> b = {bearings[chosen[0]], bearings[chosen[1]], bearings[chosen[2]]};
     const std::array<Eigen::Vector3d, 3> p = {points[chosen[0]], points[chosen[1]], points[chosen[2]]};
@@ -185,10 +188,10 @@ bool find_pose(Bearings bearings, Points points, double sigma_rad, const PnpOpti
       *best = pose;
       const size_t inliers = find_inliers(bearings, points, sigma_rad, pose, nullptr);
       const double share = static_cast<double>(inliers) / static_cast<double>(bearings.size());
-      samples = needed_samples(share, options.max_samples);
+      samples = std::min(samples, needed_samples(share, options.max_samples));
     }
   }
-  return best_cost < std::numeric_limits<double>::max();
+  return best_cost < std::numeric_limits<double>::max() ? k : 0;
 }
 
 SE3 refine_pose_in(Bearings bearings_c, Points points_w, double sigma_rad, const SE3& T_camera_world,
@@ -293,13 +296,15 @@ const PnpResult& solve_pnp(std::span<const Eigen::Vector3d> bearings_c,
   result.ok = false;
   result.T_camera_world = SE3{};
   result.inliers = 0;
+  result.samples = 0;
   result.rms_rad = 0.0;
   const size_t n = std::min(bearings_c.size(), points_w.size());
   result.inlier.assign(n, 0);
   if (n < std::max<size_t>(4, options.min_inliers) || !(sigma_rad > 0.0)) return result;
   bearings_c = bearings_c.first(n);
   points_w = points_w.first(n);
-  if (!find_pose(bearings_c, points_w, sigma_rad, options, &result.T_camera_world)) return result;
+  result.samples = find_pose(bearings_c, points_w, sigma_rad, options, &result.T_camera_world);
+  if (result.samples == 0) return result;
   result.T_camera_world = refine_pose_in(bearings_c, points_w, sigma_rad, result.T_camera_world, workspace);
   result.inliers = find_inliers(bearings_c, points_w, sigma_rad, result.T_camera_world, &result.inlier);
   const Eigen::Matrix3d r = result.T_camera_world.rotation();

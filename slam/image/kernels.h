@@ -127,6 +127,10 @@ struct Kernels {
   // distances[i] = number of bits in which `query` and the 256 bits at descriptors + 4 * indices[i] differ.
   void (*hamming)(const std::uint64_t query[4], const std::uint64_t* descriptors,
                   const std::uint32_t* indices, int count, std::uint16_t* distances);
+  // Positions of [0, count) whose word differs from `query` in at most `max_bits` bits, ascending. Sixteen
+  // words behind the last are read. Returns how many were written to `out`.
+  int (*near_words)(std::uint64_t query, const std::uint64_t* words, int count, int max_bits,
+                    std::uint32_t* out);
   // Positions of the ranges that lie in the band, range by range, ascending. Returns how many were written to
   // `out`.
   int (*select_in_band)(const PointArrays& points, const PositionRange* ranges, int range_count,

@@ -136,6 +136,13 @@ void hamming(const std::uint64_t query[4], const std::uint64_t* descriptors, con
   }
 }
 
+int near_words(std::uint64_t query, const std::uint64_t* words, int count, int max_bits, std::uint32_t* out) {
+  int found = 0;
+  for (int i = 0; i < count; ++i)
+    if (std::popcount(query ^ words[i]) <= max_bits) out[found++] = static_cast<std::uint32_t>(i);
+  return found;
+}
+
 bool in_band(const PointArrays& points, int i, const Band& band) {
   constexpr float kTurn = 6.2831853F;
   const float du = points.u_px[i] - band.u_px, dv = points.v_px[i] - band.v_px;
@@ -185,7 +192,8 @@ void sample_patch(const float* smooth, const PatchSampling& s, PatchTemplate* ou
   for (int at = 0; at < kTemplateCount; ++at) {
     const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
     const float x = (s.x0 + s.xj * j) + s.xi * i, y = (s.y0 + s.yj * j) + s.yi * i;
-    const int nearest_x = static_cast<int>(x + 0.5F), nearest_y = static_cast<int>(y + 0.5F);
+    const int nearest_x = static_cast<int>(std::floor(x + 0.5F)),
+              nearest_y = static_cast<int>(std::floor(y + 0.5F));
     const SplineWeights wx = spline(x - static_cast<float>(nearest_x)),
                         wy = spline(y - static_cast<float>(nearest_y));
     const float* p = smooth + (nearest_y - 1) * kAlignPatchSide + nearest_x - 1;
@@ -238,9 +246,9 @@ WindowSums window_sums(const std::uint8_t* corner, std::ptrdiff_t stride, const 
   return {total(sums[0]), total(sums[1]), total(sums[2]), total(sums[3]), total(sums[4])};
 }
 
-constexpr Kernels kPlain = {"plain",        resample_row, combine_rows, blur_row,      blur_column,
-                            fast_score_row, maxima_row,   centroid,     compare_pairs, hamming,
-                            select_in_band, smooth_patch, sample_patch, window_sums};
+constexpr Kernels kPlain = {"plain",        resample_row,   combine_rows, blur_row,      blur_column,
+                            fast_score_row, maxima_row,     centroid,     compare_pairs, hamming,
+                            near_words,     select_in_band, smooth_patch, sample_patch,  window_sums};
 
 }  // namespace
 

@@ -11,8 +11,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace farpoint::slam {
-namespace HWY_NAMESPACE {
+namespace farpoint::slam::HWY_NAMESPACE {
 #if HWY_TARGET == HWY_SCALAR
 // No vectors (x86 before SSSE3): the plain versions serve.
 const Kernels* table() {
@@ -256,6 +255,32 @@ void hamming(const std::uint64_t query[4], const std::uint64_t* HWY_RESTRICT des
 #endif
 }
 
+int near_words(std::uint64_t query, const std::uint64_t* HWY_RESTRICT words, int count, int max_bits,
+               std::uint32_t* HWY_RESTRICT out) {
+  const hn::CappedTag<std::uint64_t, 8> d;
+  const hn::Repartition<std::uint8_t, decltype(d)> d8;
+  const hn::RebindToSigned<decltype(d)> di;  // no comparison of unsigned words in AVX2
+  const auto q = hn::Set(d, query);
+  const auto limit = hn::Set(di, std::int64_t{max_bits} + 1);
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  const auto is_near = [&](int i) HWY_ATTR {
+    const auto difference = hn::BitCast(d8, hn::Xor(q, hn::LoadU(d, words + i)));
+    return hn::Lt(hn::BitCast(di, hn::SumsOf8(hn::PopulationCount(difference))), limit);
+  };
+  int found = 0;
+  for (int i = 0; i < count; i += 2 * lanes) {
+    const auto low = is_near(i), high = is_near(i + lanes);
+    if (hn::AllFalse(di, hn::Or(low, high))) continue;
+    std::uint64_t bits = 0, high_bits = 0;
+    hn::StoreMaskBits(di, low, reinterpret_cast<std::uint8_t*>(&bits));
+    hn::StoreMaskBits(di, high, reinterpret_cast<std::uint8_t*>(&high_bits));
+    bits |= high_bits << lanes;
+    if (count - i < 2 * lanes) bits &= (std::uint64_t{1} << (count - i)) - 1;  // what is inside
+    for (; bits != 0; bits &= bits - 1) out[found++] = static_cast<std::uint32_t>(i + __builtin_ctzll(bits));
+  }
+  return found;
+}
+
 int select_in_band(const PointArrays& points, const PositionRange* HWY_RESTRICT ranges, int range_count,
                    const Band& band, std::uint32_t* HWY_RESTRICT out) {
   const hn::CappedTag<float, 16> d;
@@ -309,6 +334,7 @@ const Kernels* table() {
                                  centroid,
                                  compare_pairs,
                                  hamming,
+                                 near_words,
                                  select_in_band,
                                  smooth_patch,
                                  sample_patch,
@@ -317,8 +343,7 @@ const Kernels* table() {
 }
 #endif  // HWY_TARGET == HWY_SCALAR
 
-}  // namespace HWY_NAMESPACE
-}  // namespace farpoint::slam
+}  // namespace farpoint::slam::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -23,6 +23,7 @@ struct ViewLandmark {
   std::uint8_t host_level = 0;
   bool in_reference = false;  // seen by the reference keyframe
   bool confirmed = false;     // state full
+  float found_share = 0;      // of the frames in which it projected into the image, those that found it
   double nearness = 0;        // in_reference: 1 / distance from the reference's camera, 1 / map units
 };
 

@@ -128,6 +128,7 @@ ViewLandmark ViewBuilder::make_landmark(LandmarkHandle handle, const Landmark& l
   v.descriptor = l.descriptor;
   v.patch = l.patch;
   v.host_level = l.host_level;
+  v.found_share = static_cast<float>(l.found) / static_cast<float>(std::max(l.visible, 1U));
   v.confirmed =
       l.state == LandmarkState::kFull || (l.state == LandmarkState::kWeak && l.observations.size() > 2);
   return v;

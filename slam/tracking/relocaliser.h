@@ -8,6 +8,7 @@
 
 #include "slam/config.h"
 #include "slam/geometry/pnp.h"
+#include "slam/image/descriptor_scan.h"
 #include "slam/image/descriptor_search.h"
 #include "slam/map/frame.h"
 #include "slam/stages.h"
@@ -25,10 +26,16 @@ class Relocaliser {
   Relocaliser(const EstimatorConfig& config, Matcher* matcher, PoseRefiner* refiner);
   void listen(StageListener* listener) { listener_ = listener; }
 
-  // Searches the landmarks seen last, then the whole view, in each camera's image by itself: around where the
-  // motion would have led, where the vehicle was last, and anywhere in the image. `last`: the last confirmed
-  // motion. Needs a view. Not ok where too few landmarks are found, or those found contradict each other.
+  // Searches the landmarks seen last, in each camera's image by itself: around where the motion would have
+  // led, where the vehicle was last, and anywhere in the image. Then a part of the whole view, another one
+  // with each frame. `last`: the last confirmed motion. Needs a view. Not ok where too few of the landmarks
+  // that should be found are found, or those found contradict each other.
   TrackOutcome relocalise(const Frame& frame, const Motion& last);
+
+  // Work of the last frame, in units of about a nanosecond, and the most that a frame of one camera begins with
+  // its last search.
+  [[nodiscard]] double work() const { return work_; }
+  static constexpr double kMostWork = 1.5e6;
 
   // Bytes of the work space.
   [[nodiscard]] std::size_t bytes() const;
@@ -40,19 +47,29 @@ class Relocaliser {
     std::int32_t feature = -1;
   };
 
-  // All in the image of one camera.
-  void search_around(const Frame& frame, int camera, const SE3& T_world_body, double radius_px,
-                     LandmarkSubset subset);
-  void search_image(const Frame& frame, int index, LandmarkSubset subset);
+  struct Search {
+    LandmarkSubset subset;
+    const SE3* around;                // null: anywhere in the image
+    std::size_t first = 0, step = 1;  // of the view's landmarks
+  };
+
+  // In the image of one camera.
+  TrackOutcome run(const Frame& frame, int camera, const Search& search, double gap_s);
+  void search_around(const Frame& frame, int camera, const Search& search, double gap_s);
+  void search_image(const Frame& frame, int camera, const Search& search);
   void search_landmark(const FrameView& image, std::uint32_t view_index, const DescriptorQuery& query);
   TrackOutcome pose_from_correspondences(const Frame& frame, int index);
 
   const TrackingConfig config_;
-  const int levels_;  // of the pyramid
   Matcher& matcher_;
   PoseRefiner& refiner_;
   StageListener* listener_ = nullptr;
 
+  std::int64_t lost_since_utime_ = 0;  // time of the last confirmed motion: another one begins a search anew
+  std::size_t next_ = 0;               // search of the next frame, after those that each begins with
+  double work_ = 0;                    // of this frame, see kWorkOfFrame
+
+  DescriptorScan scan_;
   std::vector<Correspondence> correspondences_;
   std::vector<Eigen::Vector3d> bearings_, points_;  // one a correspondence
   PnpWorkspace pnp_;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/tracking/tracker.h"
 
+#include <array>
 #include <optional>
+#include <span>
 
 #include "slam/tracking/work_space.h"
 
@@ -11,6 +13,8 @@ namespace {
 
 // Descriptor ratio of the search around the prior.
 constexpr float kPriorRatio = 0.9F;
+// Of coarse_pose(): around the landmarks of the last frame first.
+constexpr int kAttempts = 4, kAttemptsToConfirm = 2;
 
 }  // namespace
 
@@ -58,32 +62,39 @@ void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
 }
 
 TrackOutcome Tracker::track(const Frame& frame) {
-  const MotionModel& model = motion_model_ != nullptr ? *motion_model_ : motion_;
-  return track_from(frame, model.predict(frame.utime));
+  return track_within(frame, motion_model().predict(frame.utime), kAttempts);
+}
+
+TrackOutcome Tracker::confirm(const Frame& frame) {
+  return track_within(frame, motion_model().predict(frame.utime), kAttemptsToConfirm);
 }
 
 TrackOutcome Tracker::track_from(const Frame& frame, const PosePrior& prior) {
+  return track_within(frame, prior, kAttempts);
+}
+
+TrackOutcome Tracker::track_within(const Frame& frame, const PosePrior& prior, int attempts) {
   matcher_.begin(frame);
   if (!matcher_.view()) return {};
   SE3 T_world_body;
-  if (!coarse_pose(frame, prior, &T_world_body)) return {};
+  if (!coarse_pose(frame, prior, attempts, &T_world_body)) return {};
   return refiner_.refine(frame, T_world_body, prior);
 }
 
 // Searches the landmarks of the last frame around the prior, then in a wider window, then those of the whole
 // view.
-bool Tracker::coarse_pose(const Frame& frame, const PosePrior& prior, SE3* T_world_body) {
+bool Tracker::coarse_pose(const Frame& frame, const PosePrior& prior, int attempts, SE3* T_world_body) {
   const double base_px = config_.prior_search_px;
   struct Attempt {
     double radius_px;
     LandmarkSubset subset;
   };
-  const Attempt attempts[] = {{base_px, LandmarkSubset::kSeen},
-                              {2.0 * base_px, LandmarkSubset::kSeen},
-                              {2.0 * base_px, LandmarkSubset::kAll},
-                              {4.0 * base_px, LandmarkSubset::kAll}};
+  const std::array<Attempt, kAttempts> in_order{{{base_px, LandmarkSubset::kSeen},
+                                                 {2.0 * base_px, LandmarkSubset::kSeen},
+                                                 {2.0 * base_px, LandmarkSubset::kAll},
+                                                 {4.0 * base_px, LandmarkSubset::kAll}}};
   std::optional<LandmarkSubset> projected;
-  for (const Attempt& a : attempts) {
+  for (const Attempt& a : std::span(in_order).first(static_cast<std::size_t>(attempts))) {
     if (projected != a.subset) matcher_.project(frame, prior.T_world_body, a.subset);
     projected = a.subset;
     matcher_.begin(frame);

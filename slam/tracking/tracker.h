@@ -56,6 +56,9 @@ class Tracker {
   TrackOutcome track_from(const Frame& frame, const SE3& T_world_body_prior) {
     return track_from(frame, PosePrior{T_world_body_prior, Matrix6d::Zero()});
   }
+  // The same for the frame after accept_on_trial(), nearer to the prior: a pose that is right needs no wide
+  // search.
+  TrackOutcome confirm(const Frame& frame);
   // Pose of a frame after frames without one, from the last confirmed motion (Relocaliser). Not ok where the
   // landmarks found contradict each other.
   TrackOutcome relocalise(const Frame& frame);
@@ -82,7 +85,11 @@ class Tracker {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  bool coarse_pose(const Frame& frame, const PosePrior& prior, SE3* T_world_body);
+  [[nodiscard]] const MotionModel& motion_model() const {
+    return motion_model_ != nullptr ? *motion_model_ : motion_;
+  }
+  TrackOutcome track_within(const Frame& frame, const PosePrior& prior, int attempts);
+  bool coarse_pose(const Frame& frame, const PosePrior& prior, int attempts, SE3* T_world_body);
   [[nodiscard]] bool explains_matches(const PoseSolution& solution) const;
   void note_seen();
 

@@ -159,6 +159,20 @@ TEST(Pnp, RefusesWhatHasNoPose) {
   EXPECT_FALSE(solve_pnp(m.bearings_c, m.points_w, 1e-3, strict).ok);
 }
 
+// A pose needs ten inliers: of twenty matches that is a half, which few samples find.
+TEST(Pnp, TriesNoMoreSamplesThanTheFewestInliersAskFor) {
+  Rng rng(6);
+  const Matches few = make_matches(rng, 20, 1e-3, 1.0), many = make_matches(rng, 150, 1e-3, 1.0);
+  EXPECT_EQ(solve_pnp(few.bearings_c, few.points_w, 1e-3).samples, 52);  // ln 1e-3 / ln(1 - 1 / 8)
+  EXPECT_EQ(solve_pnp(many.bearings_c, many.points_w, 1e-3).samples, PnpOptions{}.max_samples);
+  int found = 0;
+  for (int k = 0; k < 40; ++k) {
+    const Matches m = make_matches(rng, 24, 1e-3, 0.4);
+    found += solve_pnp(m.bearings_c, m.points_w, 1e-3).ok ? 1 : 0;
+  }
+  EXPECT_GE(found, 36);
+}
+
 TEST(Pnp, GivesTheSameBitsAgain) {
   Rng rng(6);
   const Matches m = make_matches(rng, 150, 2e-3, 0.4);

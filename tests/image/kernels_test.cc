@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "slam/image/descriptor_pattern.h"
@@ -309,6 +310,38 @@ TEST(Kernels, HammingDistancesAreExact) {
   const std::uint32_t other = 4;
   plain_kernels().hamming(descriptors[3].words.data(), descriptors[0].words.data(), &other, 1, &opposite);
   EXPECT_EQ(opposite, 256);
+}
+
+TEST(Kernels, NearWordsAreIdenticalAndRight) {
+  std::mt19937_64 rng(41);
+  constexpr std::size_t kWords = 203, kReadBehind = 16;
+  std::vector<std::uint64_t> words(kWords + kReadBehind);
+  const std::uint64_t query = rng();
+  for (std::uint64_t& word : words) {
+    const std::uint64_t some = rng(), others = rng();
+    word = query ^ (some & others);  // a quarter of the bits differ
+  }
+  words[0] = query;
+  words[kWords - 1] = ~query;
+  words[kWords] = query;  // behind the end
+  for (const int max_bits : {0, 12, 16, 64}) {
+    for (const std::size_t count :
+         {std::size_t{0}, std::size_t{1}, std::size_t{15}, std::size_t{16}, kWords}) {
+      std::vector<std::uint32_t> expected;
+      for (std::uint32_t i = 0; i < count; ++i)
+        if (std::popcount(query ^ words[i]) <= max_bits) expected.push_back(i);
+      const auto check = [&](const Kernels& kernels) {
+        std::vector<std::uint32_t> actual(kWords + 1, 999);
+        const int n =
+            kernels.near_words(query, words.data(), static_cast<int>(count), max_bits, actual.data());
+        EXPECT_EQ(actual[static_cast<std::size_t>(n)], 999U) << "nothing is written behind the end";
+        actual.resize(static_cast<std::size_t>(n));
+        EXPECT_EQ(actual, expected) << kernels.name << ' ' << max_bits << ' ' << count;
+      };
+      for_each_target(check);
+      check(plain_kernels());
+    }
+  }
 }
 
 TEST(Kernels, BandSelectionIsIdenticalAndRight) {

@@ -94,6 +94,19 @@ TEST(ViewBuilder, MovedKeyframeMovesItsLandmarksInTheNextView) {
   EXPECT_LT((b.point_w.head<3>() / b.point_w[3] - a.point_w.head<3>() / a.point_w[3] - moved).norm(), 1e-9);
 }
 
+TEST(ViewBuilder, LandmarksSayHowOftenTheyAreFound) {
+  Drive d;
+  ViewBuilder builder(d.w.config, &d.w.map);
+  Landmark& often = *d.w.map.landmarks().get(d.landmarks[0]);
+  often.visible = 10, often.found = 9;
+  Landmark& seldom = *d.w.map.landmarks().get(d.landmarks[1]);
+  seldom.visible = 40, seldom.found = 4;
+  const auto view = builder.build(d.k[3], true);
+  ASSERT_TRUE(view);
+  EXPECT_FLOAT_EQ(find(*view, d.landmarks[0])->found_share, 0.9F);
+  EXPECT_FLOAT_EQ(find(*view, d.landmarks[1])->found_share, 0.1F);
+}
+
 TEST(ViewBuilder, RemovedLandmarksAreNotInTheNextView) {
   Drive d;
   ViewBuilder builder(d.w.config, &d.w.map);

@@ -132,7 +132,9 @@ class PointWorld {
     return frame(pose(step), static_cast<std::uint64_t>(step), points);
   }
   [[nodiscard]] static PointImage& image(const slam::Frame& frame) {
-    return const_cast<PointImage&>(dynamic_cast<const PointImage&>(*frame.views[0].image));
+    // Frames hold their image as const; a test changes what it shows.
+    return const_cast<PointImage&>(  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+        dynamic_cast<const PointImage&>(*frame.views[0].image));
   }
 
   // Both frames at their true relative pose, with every point that both show.
@@ -201,6 +203,7 @@ class MappedWorld {
   }
   std::vector<slam::KeyframeHandle> add_keyframes(int count) {
     std::vector<slam::KeyframeHandle> out;
+    out.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) out.push_back(add_keyframe(i));
     return out;
   }

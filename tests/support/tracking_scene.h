@@ -36,6 +36,7 @@ struct ScenePoint {
   std::uint8_t host_level = 0;
   bool in_reference = false, confirmed = true;
   double inverse_depth_sigma = 0;
+  float found_share = 0.5F;
 
   // In frames. The view does not show them.
   bool visible = true, aligns = true;
@@ -131,6 +132,7 @@ class TrackingScene {
       l.host_level = p.host_level;
       l.in_reference = p.in_reference;
       l.confirmed = p.confirmed;
+      l.found_share = p.found_share;
       l.nearness = p.in_reference ? rho : 0.0;
       v->landmarks.push_back(l);
     }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "tests/support/tracking_scene.h"
@@ -109,12 +110,85 @@ TEST_F(RelocaliserTest, RefusesAPoseOfTooFewLandmarks) {
   EXPECT_TRUE(relocalise(SE3{}, 0.1).ok);
 }
 
+// A twelfth of the view is there, in its right places, as where one facade looks like another.
+TEST_F(RelocaliserTest, RefusesAPlaceThatLacksMostOfWhatIsUsuallyFound) {
+  TrackingScene town(600);
+  Matcher town_matcher{town.config};
+  PoseRefiner town_refiner{town.config, &town_matcher};
+  Relocaliser town_relocaliser{town.config, &town_matcher, &town_refiner};
+  const auto relocalise_at = [&](const SE3& T_world_body, float found_share) {
+    for (std::size_t i = 0; i < town.points.size(); ++i) {
+      town.points[i].in_reference = i % 3 == 0;
+      town.points[i].visible = i % 12 == 0;
+      town.points[i].found_share = found_share;
+    }
+    const SceneFrame shown = town.look(T_world_body, last.utime += 100'000);
+    town_matcher.set_view(town.view());
+    town_matcher.begin(*shown.frame);
+    return town_relocaliser.relocalise(*shown.frame, last);
+  };
+  const SE3 here = TrackingScene::pose({0.05, 0, 0}),
+            turned = TrackingScene::pose({0.05, 0, 0}, {0.1, 0, 0.1});
+  for (const SE3& T : {here, turned}) {
+    EXPECT_FALSE(relocalise_at(T, 1.0F).ok);
+    const TrackOutcome seldom = relocalise_at(T, 0.4F);
+    EXPECT_TRUE(seldom.ok);
+    EXPECT_NEAR(seldom.found_share(), 0.083 / 0.4, 0.03);
+  }
+}
+
 TEST_F(RelocaliserTest, FindsNothingInAnotherPlace) {
   matcher.set_view(scene.view());
   TrackingScene elsewhere(240, 99);
   const SceneFrame shown = elsewhere.look(SE3{}, last.utime + 100'000);
   matcher.begin(*shown.frame);
   EXPECT_FALSE(relocaliser.relocalise(*shown.frame, last).ok);
+}
+
+// A large view in which next to nothing is found: the worst that a frame can cost.
+TEST_F(RelocaliserTest, BoundsTheWorkOfAFrameAndSearchesEverythingInTurn) {
+  TrackingScene large(3000);
+  large.config.capacity.view_landmarks = 4000;
+  large.config.capacity.landmarks = 8000;  // handles are spread
+  Matcher large_matcher{large.config};
+  PoseRefiner large_refiner{large.config, &large_matcher};
+  Relocaliser large_relocaliser{large.config, &large_matcher, &large_refiner};
+  TrackingScene elsewhere(3000, 99);
+  for (std::size_t i = 0; i < elsewhere.points.size(); ++i) elsewhere.points[i].visible = i < 1200;
+  large_matcher.set_view(large.view());
+  constexpr int kFrames = 12;
+  double least = 1e12, most = 0;
+  for (int n = 1; n <= kFrames; ++n) {
+    const SceneFrame shown = elsewhere.look(SE3{}, last.utime + n * 100'000);
+    large_matcher.begin(*shown.frame);
+    EXPECT_FALSE(large_relocaliser.relocalise(*shown.frame, last).ok);
+    least = std::min(least, large_relocaliser.work());
+    most = std::max(most, large_relocaliser.work());
+  }
+  EXPECT_GT(least, 1e4);
+  // The last search to begin is one slice of four in the whole image, or the view around the motion.
+  const double slice = 3000.0 / 4 * 1200 * 1.5, samples = 300 * 1500.0;
+  EXPECT_LT(most, Relocaliser::kMostWork + slice + samples);
+  // The whole view in one frame would be more.
+  EXPECT_LT(most, 4 * slice);
+
+  // A turn of the camera that only the whole view shows is found within the turns.
+  for (std::size_t i = 0; i < large.points.size(); ++i) {
+    large.points[i].in_reference = i % 3 == 0;
+    large.points[i].visible = i % 3 != 0 && i % 4 == 0;
+    large.points[i].found_share = 0.2F;
+  }
+  large_matcher.set_view(large.view());
+  const SE3 truth = TrackingScene::pose({0.2, 0, 0}, {0.25, 0, 0.25});
+  last.utime += 10'000'000;
+  bool found = false;
+  for (int n = 1; n <= kFrames && !found; ++n) {
+    const SceneFrame shown = large.look(truth, last.utime + 100'000);
+    large_matcher.begin(*shown.frame);
+    const TrackOutcome out = large_relocaliser.relocalise(*shown.frame, last);
+    found = out.ok && error_of(out, truth) < 1e-3;
+  }
+  EXPECT_TRUE(found);
 }
 
 TEST_F(RelocaliserTest, BeginsWithConfirmedLandmarksOnly) {

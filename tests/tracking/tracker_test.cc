@@ -51,6 +51,20 @@ class TrackerTest : public testing::Test {
 // --- frame by frame
 // ------------------------------------------------------------------------------------------------
 
+TEST_F(TrackerTest, ConfirmsOnlyWhatLiesNearThePrior) {
+  for (ScenePoint& p : scene.points) p.host_level = 0;  // coarser levels have wider windows
+  start();
+  track_and_accept(1);
+  // The prior is off by 30 px: wider than where a candidate is confirmed, within where a frame is tracked.
+  const double off_rad = 3.0 * scene.config.tracking.prior_search_px / scene.camera().focal_px();
+  const SE3 moved = drive(2).boxplus((Vector6d() << 0, 0, 0, 0, 0, off_rad).finished());
+  shown = scene.look(moved, 2 * kFrame_us);
+  EXPECT_FALSE(tracker.confirm(*shown.frame).ok);
+  EXPECT_TRUE(tracker.track(*shown.frame).ok);
+  shown = scene.look(drive(2), 2 * kFrame_us);
+  EXPECT_TRUE(tracker.confirm(*shown.frame).ok);
+}
+
 TEST_F(TrackerTest, FollowsADrive) {
   start();
   for (int n = 1; n <= 10; ++n) {
