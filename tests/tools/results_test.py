@@ -374,6 +374,8 @@ class Manifest(unittest.TestCase):
             self.assertTrue(table.commands, table.name)
             for command in table.commands:
                 program, *words = command.split()
+                if program == "sed":
+                    continue
                 if program.startswith("{bin}/"):
                     self.assertIn(program.removeprefix("{bin}/"), targets, f"{table.name}: {command}")
                 else:
