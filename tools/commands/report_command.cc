@@ -51,7 +51,7 @@ void add_report_command(CLI::App* app, Action* action) {
   command
       ->add_flag("--json", options->json,
                  "Print figures instead, on one line: work (medians of features, matches, tracks, CPU ms),\n"
-                 "frames (received, tracked, valid, dropped), memory (peak and pools, MB; after a tenth of\n"
+                 "frames (tracked, valid, dropped), memory (peak and pools, MB; after a tenth of\n"
                  "the frames, half, all)")
       ->excludes(truth)
       ->excludes(output);

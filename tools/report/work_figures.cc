@@ -59,14 +59,13 @@ Json memory_figures(const RunRecord& run) {
 }
 
 Json frame_figures(const RunRecord& run) {
-  if (run.statuses.empty()) return {};
-  const status_t& last = run.statuses.back();
   Json json = Json::object();
-  json.set("received", last.frames_received);
-  json.set("tracked", last.frames_tracked);
-  json.set("valid", last.frames_valid);
-  json.set("dropped", last.frames_dropped);
-  json.set("deadlines_missed", last.deadlines_missed);
+  const summary_t* summary = run.summary();
+  json.set("tracked", summary == nullptr ? Json() : Json(summary->frames));
+  json.set("valid", summary == nullptr ? Json() : Json(summary->frames_valid));
+  const bool told = !run.statuses.empty();
+  json.set("dropped", told ? Json(run.statuses.back().frames_dropped) : Json());
+  json.set("deadlines_missed", told ? Json(run.statuses.back().deadlines_missed) : Json());
   return json;
 }
 

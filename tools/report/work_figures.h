@@ -18,7 +18,8 @@ struct WorkFigure {
 };
 [[nodiscard]] std::vector<WorkFigure> work_figures();
 
-// Every figure by name; absent ones are null. Frames and memory come from the last status and the timings.
+// Every figure by name; absent ones are null. Dropped frames and missed deadlines are those of the last
+// status, which comes about once a second.
 [[nodiscard]] Json run_figures(const RunRecord& run);
 
 }  // namespace farpoint::tools::report

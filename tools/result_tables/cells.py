@@ -17,6 +17,10 @@ def spread(values, form):
     return " .. ".join(ends) + (f", {len(values) - len(known)} lost" if len(known) < len(values) else "")
 
 
+def name(test):
+    return CASES.get(test["case"], test["case"])
+
+
 def verdict(test):
     return "passes" if test["passed"] else "**fails**"
 
@@ -39,7 +43,8 @@ def bench(table, result):
                          f"{stage['p50_yardsticks']:.2f}, {stage['p99_yardsticks']:.2f}"])
     yardsticks, yardstick = values["process_cpu_yardsticks"], values["yardstick_ms"]
     return ["CPU time of the thread", "p50 ms", "p99 ms", "p50, p99 in yardsticks"], [
-        *rows, ["process, a frame (mean; decoding included)", f"{yardsticks * yardstick['p50']:.1f}", "", f"{yardsticks:.2f}"],
+        *rows,
+        ["process, a frame (mean; decoding included)", f"{yardsticks * yardstick['p50']:.1f}", "", f"{yardsticks:.2f}"],
         ["the yardstick", f"{yardstick['p50']:.1f}", f"{yardstick['p99']:.1f}", ""]]
 
 
@@ -73,7 +78,7 @@ def gaps(table, result):
     for test in tests(result):
         f = test["figures"]
         back = f"{f['back']}, after at most {f['latest_back_s']:.2f} s" if f["back"] else "0"
-        rows.append([CASES.get(test["case"], test["case"]), str(f["places"]), str(f["seen"]), back, str(f["poses"]), str(f["wrong_poses"]),
+        rows.append([name(test), str(f["places"]), str(f["seen"]), back, str(f["poses"]), str(f["wrong_poses"]),
                      verdict(test)])
     return ["recording", "places", "with a view seen before", "back in the same map within 1 s",
             "poses judged in 3 s after it", "wrong", "the test"], rows
@@ -83,8 +88,8 @@ def odometry_gaps(table, result):
     rows = []
     for test in tests(result):
         f = test["figures"]
-        rows.append([CASES.get(test["case"], test["case"]), f"{f['judged']} of {f['gaps']}", str(f["kept"]), str(f["resets"]),
-                     f"{f['worst_m']:.3f}", verdict(test)])
+        rows.append([name(test), f"{f['judged']} of {f['gaps']}", str(f["kept"]), str(f["resets"]), f"{f['worst_m']:.3f}",
+                     verdict(test)])
     return ["recording", "gaps judged", "motion kept, or the counter rose", "the counter rose",
             "worst error without that, m", "the test"], rows
 
@@ -120,7 +125,7 @@ def beside_load(table, result):
         rows.append([label, beside(values["load"]),
                      ", ".join(f"{latency[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")),
                      ", ".join(f"{latency[f'beyond_tracking_{p}_ms']:.2f}" for p in ("p50", "p99")),
-                     str(latency["later_than_a_frame"]), str(run["frames"]["dropped"]), str(run["frames"]["received"]),
+                     str(latency["later_than_a_frame"]), str(run["frames"]["dropped"]), str(run["images"]),
                      f"{run['tracked_percent']:.1f}"])
     return ["priorities", "beside it", "latency p50, p99, max ms", "beyond tracking p50, p99 ms",
             "later than a frame period", "dropped", "frames", "frames tracked %"], rows
@@ -136,15 +141,16 @@ def memory(table, result):
     peaks = [spread([run["memory"]["peak_mb"] for run in runs], "{:.0f}") for runs in (lockstep, threaded)]
     rows = [["peak memory of KITTI 03 half, lockstep; threads with locked memory", f"{peaks[0]} MB; {peaks[1]} MB"]]
     if divided:
-        rows.append(["of the latter after 3 s: pools, heap and stacks; libraries and program; the recording, mapped; "
-                     "locked of all", parts("pools_and_stacks", "libraries", "files", "locked")])
+        rows.append(["of the latter, after 3 s: pools, heap and stacks; libraries and program; locked of all",
+                     parts("pools_and_stacks", "libraries", "locked")])
     return ["what", "peak"], [*rows, ["pools of the estimator, by the configuration",
                                       spread([lockstep[0]["memory"]["pool_mb"]], "{:.0f} MB")]]
 
 
 def endless(table, result):
     rows = [endless_cells(label, values) for label, values in result["rows"].items()]
-    return ["drive", "frames", "resident MB after a tenth, half, all", "tracking p99 early, late, CPU ms", "the test"], rows
+    return ["drive", "frames", "resident MB after a tenth, half, all", "tracking p99 early, late, CPU ms",
+            "the test"], rows
 
 
 def endless_cells(label, values):
@@ -156,7 +162,7 @@ def endless_cells(label, values):
     else:
         (run,) = values["runs"]
         f, times, says = run["memory"]["steadiness"], ("second_twentieth_p99_ms", "last_twentieth_p99_ms"), ""
-        frames = run["frames"]["received"]
+        frames = run["frames"]["tracked"]
     return [label, f"{frames:,}", ", ".join(f"{f[key]:.1f}" for key in ("tenth_mb", "half_mb", "end_mb")),
             ", ".join(f"{f[key]:.2f}" for key in times), says]
 

@@ -123,8 +123,8 @@ def commits_since(head, paths, root=ROOT):
 
 def is_of(table, result, commit):
     """Whether the table was made by its present commands, with the build of this commit."""
-    return (result is not None and not result["made"].get("carried_over") and result["made"]["commands"] == table.commands
-            and result["made"]["commit"].startswith(commit))
+    return (result is not None and not result["made"].get("carried_over")
+            and result["made"]["commands"] == table.commands and result["made"]["commit"].startswith(commit))
 
 
 def minutes(table, result):
