@@ -9,7 +9,7 @@ def escaped(text):
 
 
 def spread(values, form):
-    """Least and greatest, or the one that both are as text; None counts as lost."""
+    """Least and greatest as text, one where both are equal; None counts as lost."""
     known = sorted(value for value in values if value is not None)
     if not known:
         return "lost"
@@ -154,7 +154,7 @@ def endless(table, result):
 
 
 def endless_cells(label, values):
-    """From a test, or from a run's report."""
+    """Figures of a test or of a run's report."""
     if "tests" in values:
         (test,) = values["tests"]
         f, times, says = test["figures"], ("early_p99_ms", "late_p99_ms"), verdict(test)
@@ -168,7 +168,7 @@ def endless_cells(label, values):
 
 
 def hil(table, result):
-    """A scenario's run as it is, and the complaint of the broken one."""
+    """Each scenario's figures, and the complaint of its broken form."""
     broken = {one["name"]: one for one in result["rows"]["broken"]["scenarios"]}
     rows = []
     for one in result["rows"]["as it is"]["scenarios"]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Load beside a measured run, without programs from outside: processes at normal priority that compute, copy memory, or
+"""Load beside a measured run, without programs from outside: processes at normal priority that compute, copy memory or
 write to the disk. They end with the process that started them.
 
 usage: load.py KIND PARENT_PID FOLDER"""

@@ -18,7 +18,7 @@ PARTIAL = store.ROOT / "build" / "results"
 
 
 def run(command, folder, keep_stderr, may_fail=False):
-    """What the command prints. `may_fail`: status 1 with something printed is a result too."""
+    """Standard output of the command. `may_fail`: status 1 with output is accepted."""
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=folder, text=True, check=False,
                           stdout=subprocess.PIPE, stderr=None if keep_stderr else subprocess.PIPE)
     if done.returncode == 0 or (may_fail and done.returncode == 1 and done.stdout.strip()):
@@ -33,7 +33,7 @@ def filled(command, places):
     return command
 
 
-# They show on standard error how far they are.
+# They draw progress on standard error.
 TALKING = ("tools/compare_modes", "tools/live_runs", "tools/hil/bench")
 TAKING_BIN = ("tools/compare_modes", "tools/live_runs")
 

@@ -22,10 +22,10 @@ class Table:
     kind: str  # a key of render.KINDS
     rows: tuple
     inputs: tuple = ESTIMATOR  # a change of these makes the table old
-    timed: bool = False  # holds measured times: no two runs are equal, and no other work may run beside it
+    timed: bool = False  # holds measured times: no two runs are equal; other work on the machine disturbs it
     long: bool = False  # --long runs it again and compares exactly
-    minutes: float = 1  # it takes about so long on two cores; a finished result has the measured time
-    shows_failures: bool = False  # its last command ends with 1 and prints a result all the same where a check fails
+    minutes: float = 1  # estimate for two cores; a finished result has the measured time
+    shows_failures: bool = False  # status 1 with JSON is a result: a failed check is marked in the table
 
     @property
     def commands(self):
@@ -63,8 +63,9 @@ def live(label, importing, options):
 
 
 def recorded_tests(name, kind, program, suite, **other):
-    """A table of what long tests record; a test that fails stays in it, and is called so."""
-    return Table(name, kind, (Row(suite, (test_figures(program, suite),)),), shows_failures=True, **other)
+    """A table of figures that long tests record; a failed test keeps its row and is marked."""
+    return Table(name, kind, (Row(suite, (test_figures(program, suite),)),), (*ESTIMATOR, "tests/replay"),
+                 shows_failures=True, **other)
 
 
 def test_figures(program, suite):
@@ -76,7 +77,7 @@ PRIORITIES = "".join(f" --set realtime.{thread}_priority={priority}"
 
 
 def beside_load(label, settings):
-    """Two minutes at 30 Hz, with twice the work that the machine has cores for."""
+    """Two minutes at 30 Hz beside four processes of load."""
     return Row(label, ("sed 's/rate_hz: .*/rate_hz: 30/' {root}/config/worlds/endless.yaml > endless30.yaml",
                        "{bin}/farpoint simulate endless30.yaml -o run.lcm --size 320x240 --duration 120",
                        f"tools/live_runs run.lcm --computing 2 --copying 1 --writing 1{settings}"))
@@ -142,11 +143,11 @@ TABLES = (
         Row("rendered world `endless`, 320x240", (
             "{bin}/farpoint simulate endless -o - --size 320x240 --duration 2000 | "
             "{bin}/farpointd --replay - --lockstep --output out.lcm", "{bin}/farpoint report out.lcm --json")),
-    ), (*DAEMON, "tests/scenes", "tools/simulate"), timed=True, minutes=15, shows_failures=True),
+    ), (*DAEMON, "tests/replay", "tests/scenes", "tools/simulate"), timed=True, minutes=20, shows_failures=True),
     Table("beside_load", "beside_load", (
         beside_load("`SCHED_FIFO`: capture 40, output 35, tracking 30", PRIORITIES),
         beside_load("ordinary", ""),
-    ), (*DAEMON, "tools/live_runs", "tools/result_tables/load.py"), timed=True, minutes=6),
+    ), (*DAEMON, "tools/live_runs", "tools/result_tables/load.py"), timed=True, minutes=9),
     Table("hil", "hil", (
         Row("as it is", ("tools/hil/bench --build {build} --json",)),
         Row("broken", ("tools/hil/bench --build {build} --self-test --json",)),
