@@ -68,11 +68,11 @@ class Cells(unittest.TestCase):
         rows = {"KITTI, 1": {"load": {"computing": 8}, "runs": [live_run(0.199), live_run(0.2554), live_run(0.21)]},
                 "KITTI, 6": {"load": {},
                              "runs": [live_run(0.2, times_lost=2), live_run(None, times_lost=1, dropped=7)]},
-                "EuRoC": {"load": {}, "runs": [live_run(0.00431)]}}
+                "EuRoC": {"load": {}, "runs": [live_run(0.00431), live_run(None)]}}
         self.assertEqual(self.table("threads", rows), [
             "| KITTI, 1 | 8 computing | 3 | none | 0.199 .. 0.255 | 100.0 | 98.8 | 0 |",
             "| KITTI, 6 | nothing | 2 | 3, in 2 of 2 runs | 0.200, 1 lost | 100.0 | 98.8 | 0 .. 7 |",
-            "| EuRoC | nothing | 1 | none | 0.0043 | 100.0 | 98.8 | 0 |"])
+            "| EuRoC | nothing | 2 | none | 0.0043, 1 lost | 100.0 | 98.8 | 0 |"])
 
     def test_no_run_with_a_path_is_lost(self):
         self.assertEqual(cells.spread([None, None], "{:.3f}"), "lost")

@@ -108,7 +108,7 @@ def threads(table, result):
     for label, values in result["rows"].items():
         runs = values["runs"]
         ate = [run["final"]["ate_rmse_m"] for run in runs]
-        form = "{:.4f}" if all(value is not None and value < 0.02 for value in ate) else "{:.3f}"
+        form = "{:.4f}" if all(value < 0.02 for value in ate if value is not None) else "{:.3f}"
         rows.append([label, beside(values["load"]), str(len(runs)), lost(runs), spread(ate, form),
                      spread([100 * run["final"]["share"] for run in runs], "{:.1f}"),
                      spread([100 * run["live"]["share"] for run in runs], "{:.1f}"),

@@ -131,7 +131,7 @@ TABLES = (
         live("EuRoC part, camera 0 (20 Hz), 1", EUROC, "--speed 1 --computing 8"),
         live("EuRoC part, 1 to 4", EUROC, "--speed 1,2,3,4"),
         live("EuRoC part, 6 (120 Hz)", EUROC, "--speed 6 --runs 2"),
-    ), DAEMON, timed=True, minutes=6),
+    ), DAEMON, timed=True, minutes=7),
     Table("memory", "memory", (
         Row("lockstep", (KITTI, "{bin}/farpointd --replay run.lcm --lockstep --output out.lcm",
                          "{bin}/farpoint report out.lcm --json")),
