@@ -7,6 +7,10 @@ machine is started. And every scenario can be read.
 """
 
 import collections
+import importlib.machinery
+import importlib.util
+import io
+import json
 import math
 import pathlib
 import struct
@@ -466,6 +470,37 @@ class Scenarios(unittest.TestCase):
         self.assertTrue(one.fails_as_it_says("frame 5 never came"))
         self.assertFalse(one.fails_as_it_says("the scenario did not end in time"))
         self.assertFalse(one.fails_as_it_says(None))
+
+
+class Results(unittest.TestCase):
+    """What the bench prints of a scenario: as a row, and as JSON."""
+
+    def setUp(self):
+        loader = importlib.machinery.SourceFileLoader("bench", str(ROOT / "tools/hil/bench"))
+        self.bench = importlib.util.module_from_spec(importlib.util.spec_from_loader("bench", loader))
+        loader.exec_module(self.bench)
+        self.one = scenario.Scenario("can", "Odometry.", "", broken="an epoch is cut", broken_says="^counter")
+
+    def result(self, complaint, self_test):
+        found = self.bench.result_of(self.one, complaint, ["50 Hz", "age right"], "12", self_test)
+        stream = io.StringIO()
+        self.bench.print_row(self.one, found, stream)
+        self.assertEqual(json.loads(json.dumps(found)), found)
+        self.assertEqual((found["name"], found["title"], found["broken"]), ("can", "Odometry.", "an epoch is cut"))
+        return found["well"], found["text"], " ".join(stream.getvalue().split())
+
+    def test_a_good_run_has_its_figures(self):
+        self.assertEqual(self.result(None, False), (True, "50 Hz; age right", "can ok 12 50 Hz; age right"))
+
+    def test_a_bad_run_has_its_complaint(self):
+        self.assertEqual(self.result("counter 6 after 4", False)[:2], (False, "counter 6 after 4"))
+
+    def test_a_broken_run_has_the_complaint_that_it_names(self):
+        self.assertEqual(self.result("counter 6 after 4", True)[:2], (True, "counter 6 after 4"))
+        well, text, row = self.result("the machine did not come to it", True)
+        self.assertEqual((well, text), (False, "the machine did not come to it"))
+        self.assertIn("FAILED 12 the machine did not come to it expected: ^counter", row)
+        self.assertEqual(self.result(None, True)[:2], (False, "did not fail"))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include "tests/ipc/log_events.h"
 #include "tests/ipc/scratch.h"
 #include "tests/replay/recordings.h"
+#include "tests/support/record.h"
 #include "tools/evaluate/statistics.h"
 
 namespace farpoint::test {
@@ -71,7 +72,13 @@ TEST(RecordedEndlessLong, MemoryAndTimeStayAsTheyAre) {
                 1e-6 * static_cast<double>(timings[i].resident_bytes),
                 tracking_p99_ms(timings, i - 499, i + 1));
   // The map forgets from about a thousand frames on.
-  constexpr std::size_t kHalf = kFrames / 2;
+  constexpr std::size_t kTenth = kFrames / 10, kHalf = kFrames / 2;
+  testing::Test::RecordProperty("frames", static_cast<int>(kFrames));
+  record_number("tenth_mb", 1e-6 * static_cast<double>(timings[kTenth - 1].resident_bytes));
+  record_number("half_mb", 1e-6 * static_cast<double>(timings[kHalf - 1].resident_bytes));
+  record_number("end_mb", 1e-6 * static_cast<double>(timings.back().resident_bytes));
+  record_number("early_p99_ms", tracking_p99_ms(timings, 500, 1000));
+  record_number("late_p99_ms", tracking_p99_ms(timings, kFrames - 500, kFrames));
   EXPECT_LT(static_cast<double>(timings.back().resident_bytes),
             1.02 * static_cast<double>(timings[kHalf].resident_bytes));
   EXPECT_LE(static_cast<double>(timings.back().peak_resident_bytes), 200e6);

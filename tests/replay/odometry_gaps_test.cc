@@ -12,6 +12,7 @@
 #include "tests/ipc/scratch.h"
 #include "tests/replay/gaps.h"
 #include "tests/replay/recordings.h"
+#include "tests/support/record.h"
 
 namespace farpoint::test {
 namespace {
@@ -33,6 +34,21 @@ const std::vector<double> kLengths_s = {0.5, 1.0, 1.5, 2.0, 3.0}, kShort_s = {1.
 struct Sum {
   int judged = 0, kept = 0, resets = 0;
   double worst_m = 0.0;  // of those without a reset
+
+  void add(const OdometryOverGap& o) {
+    if (!o.judged) return;
+    ++judged;
+    kept += o.kept() ? 1 : 0;
+    resets += o.reset ? 1 : 0;
+    if (!o.reset) worst_m = std::max(worst_m, o.error_m);
+  }
+  // For tests/RESULTS.md.
+  void record() const {
+    testing::Test::RecordProperty("judged", judged);
+    testing::Test::RecordProperty("kept", kept);
+    testing::Test::RecordProperty("resets", resets);
+    record_number("worst_m", worst_m);
+  }
 };
 
 class RecordedOdometryGaps : public testing::TestWithParam<Source> {
@@ -53,14 +69,12 @@ class RecordedOdometryGaps : public testing::TestWithParam<Source> {
          spread_gaps({GetParam().first_s, last_s, gaps, GetParam().apart_s, lengths_s}))
       for (const GapOutcome& o : experiment.run(of_replay)) {
         std::printf("%s %s\n", GetParam().name.c_str(), odometry_to_text(o).c_str());
-        if (!o.odometry.judged) continue;
-        ++sum.judged;
-        sum.kept += o.odometry.kept() ? 1 : 0;
-        sum.resets += o.odometry.reset ? 1 : 0;
-        if (!o.odometry.reset) sum.worst_m = std::max(sum.worst_m, o.odometry.error_m);
+        sum.add(o.odometry);
       }
     std::printf("%s: %d of %d gaps kept, the counter rose at %d, worst error without that %.3f m\n",
                 GetParam().name.c_str(), sum.kept, sum.judged, sum.resets, sum.worst_m);
+    testing::Test::RecordProperty("gaps", gaps);
+    sum.record();
     return sum;
   }
 

@@ -2,6 +2,7 @@
 // Half a second to two seconds without images, anywhere in a recording: the way back into the same map.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -11,6 +12,7 @@
 #include "tests/ipc/scratch.h"
 #include "tests/replay/gaps.h"
 #include "tests/replay/recordings.h"
+#include "tests/support/record.h"
 
 namespace farpoint::test {
 namespace {
@@ -28,6 +30,27 @@ const Recording kEuroc{"euroc", "euroc/MH_01_part", "euroc {}/euroc/MH_01_part",
 
 struct Sum {
   int places = 0, seen = 0, back = 0, poses = 0, wrong_poses = 0;
+  double latest_back_s = 0.0;  // of those within a second
+
+  void add(const GapOutcome& o) {
+    ++places;
+    poses += o.poses;
+    wrong_poses += o.wrong_poses;
+    if (!o.tracked_before || !o.seen_before()) return;
+    ++seen;
+    if (o.back_after_s < 0.0 || o.back_after_s > 1.0) return;
+    ++back;
+    latest_back_s = std::max(latest_back_s, o.back_after_s);
+  }
+  // For tests/RESULTS.md.
+  void record() const {
+    testing::Test::RecordProperty("places", places);
+    testing::Test::RecordProperty("seen", seen);
+    testing::Test::RecordProperty("back", back);
+    record_number("latest_back_s", latest_back_s);
+    testing::Test::RecordProperty("poses", poses);
+    testing::Test::RecordProperty("wrong_poses", wrong_poses);
+  }
 };
 
 class RecordedGaps : public testing::TestWithParam<Recording> {
@@ -47,17 +70,13 @@ class RecordedGaps : public testing::TestWithParam<Recording> {
          spread_gaps({GetParam().first_s, experiment.length_s() - kJudged_s, places, GetParam().apart_s})) {
       for (const GapOutcome& o : experiment.run(gaps)) {
         std::printf("%s\n", to_text(o).c_str());
-        ++sum.places;
-        sum.seen += o.tracked_before && o.seen_before() ? 1 : 0;
-        sum.back +=
-            o.tracked_before && o.seen_before() && o.back_after_s >= 0.0 && o.back_after_s <= 1.0 ? 1 : 0;
-        sum.poses += o.poses;
-        sum.wrong_poses += o.wrong_poses;
+        sum.add(o);
       }
     }
     std::printf(
         "%s: %d places, %d with a view seen before, back within a second at %d of them; %d poses, %d wrong\n",
         GetParam().name.c_str(), sum.places, sum.seen, sum.back, sum.poses, sum.wrong_poses);
+    sum.record();
     return sum;
   }
 

@@ -16,6 +16,7 @@
 #include "tools/report/histogram.h"
 #include "tools/report/html.h"
 #include "tools/report/plot.h"
+#include "tools/report/work_figures.h"
 
 namespace farpoint::tools::report {
 namespace {
@@ -175,6 +176,38 @@ TEST_F(ReportOfARun, WhatIsNoRunIsRefused) {
   EXPECT_EQ(result.status, kExitMisused);
   EXPECT_NE(result.err.find("path.tum: expected an output log"), std::string::npos) << result.err;
   EXPECT_FALSE(std::filesystem::exists(*folder / "none.html"));
+}
+
+// The figures of the section "Work", by names; frames and memory beside them.
+TEST_F(ReportOfARun, FiguresAreThereForMachines) {
+  ASSERT_EQ(made.status, 0) << made.err;
+  const Json figures = make_figures({*folder / "vmp.lcm", *folder / "vmp.lcm"});
+  const std::string text = figures.dump();
+  EXPECT_EQ(run_farpoint_program("report " + (*folder / "vmp.lcm").string() + " " +
+                                 (*folder / "vmp.lcm").string() + " --json")
+                .out,
+            text + "\n");
+  const Json run = run_figures(read_run_record(*folder / "vmp.lcm", nullptr));
+  EXPECT_EQ(run.find("work.features")->number(), 1500.0);
+  EXPECT_GT(run.find("work.matches")->number(), 50.0);
+  EXPECT_LE(run.find("work.inliers")->number(), run.find("work.matches")->number());
+  EXPECT_GE(run.find("work.keyframes_a_point")->number(), 2.0);
+  EXPECT_GT(run.find("work.seconds_a_point")->number(), 0.0);
+  EXPECT_GT(run.find("work.mapping_ms")->number(), run.find("work.local_ba_ms")->number());
+  EXPECT_EQ(run.find("frames.tracked")->number(), 90.0);
+  EXPECT_LE(run.find("frames.valid")->number(), 90.0);
+  EXPECT_EQ(run.find("frames.dropped")->number(), 0.0);
+  EXPECT_GT(run.find("memory.peak_mb")->number(), run.find("memory.pool_mb")->number());
+  EXPECT_FALSE(run.find("memory.steadiness")->is_object()) << "90 frames are too few";
+}
+
+TEST_F(ReportOfARun, AReportHasOneForm) {
+  const std::string run = "report " + (*folder / "vmp.lcm").string();
+  const ProgramResult none = run_farpoint_program(run);
+  EXPECT_EQ(none.status, kExitMisused);
+  EXPECT_NE(none.err.find("expected -o FILE or --json"), std::string::npos) << none.err;
+  EXPECT_EQ(run_farpoint_program(run + " --json -o " + (*folder / "none.html").string()).status,
+            kExitMisused);
 }
 
 // What the estimator tells about its landmarks is consistent, and near the truth.

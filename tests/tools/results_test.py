@@ -7,8 +7,6 @@ usage: results_test.py SOURCE_FOLDER
 
 import contextlib
 import datetime
-import importlib.machinery
-import importlib.util
 import io
 import json
 import pathlib
@@ -16,24 +14,13 @@ import random
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 import unittest
 import unittest.mock
 
-ROOT = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else __file__).resolve()
-ROOT = ROOT if ROOT.is_dir() else ROOT.parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-from result_tables import figures, making, manifest, render, spread, store  # noqa: E402
-from result_tables.progress import Progress  # noqa: E402
-
-
-def script(name):
-    """A script of tools/ as a module."""
-    loader = importlib.machinery.SourceFileLoader(name, str(ROOT / "tools" / name))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
-    loader.exec_module(module)
-    return module
+from results_support import ROOT, memory_rows, result_of, script  # sets the path of what follows
+from result_tables import figures, making, manifest, render, spread, store
+from result_tables.progress import Progress
 
 
 def run_row(ate_m, depth_m=40.0):
@@ -43,12 +30,6 @@ def run_row(ate_m, depth_m=40.0):
 
 def pair(start, baseline_m, vmp_m):
     return {"start": start, "baseline": run_row(baseline_m), "vmp": run_row(vmp_m)}
-
-
-def result_of(table, rows, commit="0123456789", inputs=None):
-    return {"table": table.name, "rows": rows,
-            "made": {"commit": commit, "date": "2026-11-20", "seconds": 3, "commands": table.commands,
-                     "machine": {"cpu": "a processor", "cores": 2, "simd": "AVX2"}, "inputs": inputs or {}}}
 
 
 class Bootstrap(unittest.TestCase):
@@ -130,6 +111,16 @@ class Headline(unittest.TestCase):
         self.assertEqual(len(rows), 4)
         for row in rows:
             self.assertRegex(row, r"^\| .* \| .*\d.* \| `\w+`, `[0-9a-f]{7}` \|$")
+
+    def test_figures_of_made_tables_stand_in_it(self):
+        results = {table.name: store.load(table.name, ROOT / "tests" / "results") for table in manifest.TABLES}
+        stage = {"p50_ms": 3.25, "p99_ms": 4.5, "p50_yardsticks": 0.41, "p99_yardsticks": 0.6}
+        bench = {"stages": {"tracking": stage}, "process_cpu_yardsticks": 2, "yardstick_ms": {"p50": 8, "p99": 10}}
+        results["bench"] = result_of(manifest.find("bench"), {"KITTI": bench})
+        results["memory"] = result_of(manifest.find("memory"), memory_rows([160.4], [192.1, 193.8]))
+        text = render.headline(results)
+        self.assertIn("| 3.2, 4.5 ms; 0.41, 0.60 of `cv::ORB`'s time | `bench`, `0123456` |", text)
+        self.assertIn("| 160 MB; 192 .. 194 MB | `memory`, `0123456` |", text)
 
     def test_a_table_that_is_not_made_leaves_it_out(self):
         self.assertNotIn("headline", render.blocks({table.name: None for table in manifest.TABLES}))
@@ -248,6 +239,11 @@ class Comparison(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name:
             store.save(result, pathlib.Path(name))
             self.assertEqual(store.load(table.name, pathlib.Path(name)), result)
+            for key in ("pairs", "runs", "tests", "scenarios"):
+                result["rows"]["r"] = {"a": 1, key: [{"b": 2}, {"b": 3}]}
+                store.save(result, pathlib.Path(name))
+                self.assertEqual(store.load(table.name, pathlib.Path(name)), result)
+                self.assertIn('\n{"b": 3}', (pathlib.Path(name) / f"{table.name}.json").read_text())
 
     def test_measured_times_are_not_kept(self):
         kept = json.dumps(figures.repeatable({"tracking_ms": {"p50": 1}, "peak_resident_mb": 2, "final": {"n": 3}}))
@@ -255,8 +251,8 @@ class Comparison(unittest.TestCase):
 
 
 class Making(unittest.TestCase):
-    def make_row(self, *commands):
-        table = manifest.Table("t", "bench", (manifest.Row("r", commands),))
+    def make_row(self, *commands, **options):
+        table = manifest.Table("t", "bench", (manifest.Row("r", commands),), **options)
         return making.make_row(table, table.rows[0], {"bin": "/bin", "data": "", "root": ROOT, "jobs": ""})
 
     def test_the_last_command_of_a_row_is_kept(self):
@@ -265,6 +261,23 @@ class Making(unittest.TestCase):
     def test_a_failed_command_is_named_with_what_it_said(self):
         with self.assertRaisesRegex(store.ResultsError, "status 3 of .*no recording"):
             self.make_row("echo no recording >&2; exit 3")
+
+    def test_a_program_that_fails_before_a_pipe_is_found(self):
+        with self.assertRaisesRegex(store.ResultsError, "status 4"):
+            self.make_row("(echo 1; exit 4) | cat")
+
+    def test_a_failed_check_is_a_result_where_the_table_shows_it(self):
+        self.assertEqual(self.make_row("echo 5; exit 1", shows_failures=True), 5)
+        for command, shows in (("echo 5; exit 1", False), ("echo 5; exit 2", True), ("exit 1", True)):
+            with self.assertRaises(store.ResultsError):
+                self.make_row(command, shows_failures=shows)
+
+    def test_of_live_runs_the_usual_figures_are_kept(self):
+        run = {"speed": 1, "final": {"ate_rmse_m": 1, "mean": 2}, "live": {}, "memory": {"peak_mb": 3}}
+        (kept,) = figures.live({"load": {}, "runs": [run]})["runs"]
+        self.assertEqual((kept["final"]["ate_rmse_m"], kept["memory"]), (1, {"peak_mb": 3}))
+        self.assertNotIn("mean", kept["final"])
+        self.assertEqual(figures.live({"runs": [{"name": "out"}]}), {"runs": [{"name": "out"}]})
 
     def test_a_build_of_no_commit_is_refused(self):
         with self.assertRaises(store.ResultsError):
@@ -317,6 +330,67 @@ class Interrupted(WithDaemon):
         self.make()
         self.make()
         self.assertEqual(self.ran.read_text(), "a\na\n")
+
+
+class AllOfThem(WithDaemon):
+    """Which tables --all makes, and that one which cannot be made stops none."""
+
+    def setUp(self):
+        super().setUp()
+        self.results = script("results")
+        self.tables = tuple(manifest.Table(name, "bench", (manifest.Row("r", (command,)),), timed=timed, minutes=3)
+                            for name, command, timed in (("timed", "echo {}", True), ("broken", "exit 3", False),
+                                                         ("other", "echo {}", False)))
+        for target, value in ((manifest, {"TABLES": self.tables}), (store, {"FOLDER": self.folder}),
+                              (self.results, {"write_texts": lambda: None})):
+            patch = unittest.mock.patch.multiple(target, **value)
+            patch.start()
+            self.addCleanup(patch.stop)
+        self.loaded = unittest.mock.patch.object(store, "load", lambda name, folder=self.folder: (
+            json.loads((folder / f"{name}.json").read_text()) if (folder / f"{name}.json").is_file() else None))
+        self.loaded.start()
+        self.addCleanup(self.loaded.stop)
+
+    def save(self, name, commit, **made):
+        table = manifest.find(name)
+        result = result_of(table, {"r": {}}, commit)
+        result["made"].update(made)
+        store.save(result, self.folder)
+
+    def chosen(self):
+        return [table.name for table in self.results.chosen(self.results.options(["--all", "--bin", str(self.folder)]))]
+
+    def test_times_are_measured_last(self):
+        self.assertEqual(self.chosen(), ["broken", "other", "timed"])
+
+    def test_what_this_build_has_made_is_left_out(self):
+        self.save("timed", "0123456789ab" + "0" * 28)
+        self.save("broken", "f" * 40)
+        self.save("other", "0123456789ab" + "0" * 28, carried_over="by hand")
+        self.assertEqual(self.chosen(), ["broken", "other"])
+
+    def test_another_command_is_made_again(self):
+        self.save("timed", "0123456789ab" + "0" * 28, commands=["false"])
+        self.assertIn("timed", self.chosen())
+
+    def test_a_table_that_cannot_be_made_stops_none(self):
+        o = self.results.options(["--all", "--bin", str(self.folder)])
+        saved = []
+        with unittest.mock.patch.object(store, "save", lambda result: saved.append(result["table"])), \
+                unittest.mock.patch.object(making, "PARTIAL", self.folder), \
+                contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
+            self.assertFalse(self.results.make_tables(o))
+        self.assertEqual(saved, ["other", "timed"])
+        self.assertIn("not made: broken", said.getvalue())
+
+    def test_the_list_has_minutes(self):
+        self.save("timed", "0123456789ab", seconds=600)
+        results = {table.name: store.load(table.name) for table in self.tables}
+        with contextlib.redirect_stdout(io.StringIO()) as printed, \
+                unittest.mock.patch.object(self.results, "load_all", lambda: results):
+            self.results.list_tables()
+        self.assertIn("broken: not made yet; about 3 min\n", printed.getvalue())
+        self.assertIn("accuracy: 2 tables, about 6 min\nall: 3 tables, about 16 min\n", printed.getvalue())
 
 
 class CheckLong(WithDaemon):
@@ -374,12 +448,21 @@ class Manifest(unittest.TestCase):
             self.assertTrue(table.commands, table.name)
             for command in table.commands:
                 program, *words = command.split()
+                if program == "sed":
+                    continue
                 if program.startswith("{bin}/"):
                     self.assertIn(program.removeprefix("{bin}/"), targets, f"{table.name}: {command}")
                 else:
                     self.assertTrue((ROOT / program).is_file(), f"{table.name}: {command}")
                 if program == "{bin}/farpoint":
                     self.assertTrue((ROOT / f"tools/commands/{words[0]}_command.cc").is_file(), command)
+
+    def test_no_table_is_made_by_hand(self):
+        for table in manifest.TABLES:
+            self.assertIn(table.kind, render.KINDS, table.name)
+            self.assertIn(table.kind, making.KEEP, table.name)
+            for row in table.rows:
+                self.assertRegex(row.commands[-1], r" --json$|^tools/(live_runs|test_figures) ", table.name)
 
     def test_every_suite_of_a_command_exists(self):
         sources = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("*_test.cc"))

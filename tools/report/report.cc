@@ -3,6 +3,7 @@
 
 #include "tools/report/html.h"
 #include "tools/report/sections.h"
+#include "tools/report/work_figures.h"
 
 namespace farpoint::tools::report {
 
@@ -24,6 +25,14 @@ std::string make_report(const ReportRequest& request) {
           vmp_section(runs) + map_section(runs) + track_section(runs, request.truth) + timing_section(runs) +
           workload_section(runs) + health_section(runs) + configuration_section(runs);
   return page("Farpoint: " + names, body);
+}
+
+Json make_figures(const std::vector<std::filesystem::path>& runs) {
+  Json::Array items;
+  for (const std::filesystem::path& file : runs) items.push_back(run_figures(read_run_record(file, nullptr)));
+  Json json = Json::object();
+  json.set("runs", items);
+  return json;
 }
 
 }  // namespace farpoint::tools::report

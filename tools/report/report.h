@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tools/common/json.h"
+
 namespace farpoint::tools::report {
 
 struct ReportRequest {
@@ -15,5 +17,9 @@ struct ReportRequest {
 
 // Throws InputError for a file that cannot be read.
 [[nodiscard]] std::string make_report(const ReportRequest& request);
+
+// Figures of runs without truth, for machines: {"runs": [{"name", "work", "frames", "memory"}]}. Throws
+// InputError for a file that cannot be read.
+[[nodiscard]] Json make_figures(const std::vector<std::filesystem::path>& runs);
 
 }  // namespace farpoint::tools::report

@@ -17,13 +17,14 @@ from .progress import Progress
 PARTIAL = store.ROOT / "build" / "results"
 
 
-def run(command, folder, keep_stderr):
-    done = subprocess.run(command, shell=True, cwd=folder, text=True, check=False, stdout=subprocess.PIPE,
-                          stderr=None if keep_stderr else subprocess.PIPE)
-    if done.returncode != 0:
-        said = (done.stderr or "").strip().splitlines()[-1:] or ["no message"]
-        raise store.ResultsError(f"status {done.returncode} of '{command}': {said[0]}")
-    return done.stdout
+def run(command, folder, keep_stderr, may_fail=False):
+    """Standard output of the command. `may_fail`: status 1 with output is accepted."""
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=folder, text=True, check=False,
+                          stdout=subprocess.PIPE, stderr=None if keep_stderr else subprocess.PIPE)
+    if done.returncode == 0 or (may_fail and done.returncode == 1 and done.stdout.strip()):
+        return done.stdout
+    said = (done.stderr or "").strip().splitlines()[-1:] or ["no message"]
+    raise store.ResultsError(f"status {done.returncode} of '{command}': {said[0]}")
 
 
 def filled(command, places):
@@ -32,28 +33,42 @@ def filled(command, places):
     return command
 
 
+# They draw progress on standard error.
+TALKING = ("tools/compare_modes", "tools/live_runs", "tools/hil/bench")
+TAKING_BIN = ("tools/compare_modes", "tools/live_runs")
+
+
 def make_row(table, row, places):
-    """What the last command of the row prints. compare_modes draws a bar of its own, so its standard error stays."""
+    """What the last command of the row prints."""
     with tempfile.TemporaryDirectory(prefix="farpoint_results_") as name:
         for command in row.commands:
+            script = command.split()[0]
             command = filled(command, places)
-            if command.startswith("tools/compare_modes"):
-                command = f"{places['root']}/{command} --bin {places['bin']}"
-            printed = run(command, pathlib.Path(name), table.kind == "pairs")
+            if script in TAKING_BIN:
+                command = f"{command} --bin {places['bin']}"
+            if script.startswith("tools/"):
+                command = f"{places['root']}/{command}"
+            printed = run(command, pathlib.Path(name), script in TALKING, table.shows_failures)
     return KEEP[table.kind](json.loads(printed))
+
+
+def as_printed(printed):
+    return printed
 
 
 KEEP = {
     "accuracy": lambda printed: figures.repeatable(printed["runs"][0]),
     "scenes": lambda printed: {key: printed["scenes"][0][key] for key in ("abs_z_p95", "pairs")},
     "pairs": lambda printed: {"pairs": printed["pairs"]},
-    "bench": lambda printed: printed,
+    "bench": as_printed, "work": as_printed, "gaps": as_printed, "odometry_gaps": as_printed, "threads": figures.live,
+    "memory": figures.live, "endless": as_printed, "beside_load": figures.live, "hil": as_printed,
 }
 
 
 def make_rows(table, programs, data, jobs, known=None):
     """Figures of each row; those in `known` are not made again."""
-    places = {"bin": programs, "data": data, "root": store.ROOT, "jobs": f" --jobs {jobs}"}
+    places = {"bin": programs, "build": pathlib.Path(programs).parent, "data": data, "root": store.ROOT,
+              "jobs": f" --jobs {jobs}"}
     known = known or Finished(None, table)
     progress = Progress(len(table.rows), table.name)
 

@@ -4,7 +4,7 @@
 import re
 import statistics
 
-from . import figures, spread
+from . import cells, figures, spread
 from .manifest import TABLES, find, shown
 from .store import ResultsError
 
@@ -14,7 +14,7 @@ MARKER = re.compile(r"<!-- /?results:(\w+) -->")
 
 
 def grid(columns, rows):
-    lines = [f"| {' | '.join(cells)} |" for cells in (columns, *rows)]
+    lines = [f"| {' | '.join(row)} |" for row in (columns, *rows)]
     return "\n".join([lines[0], "|" + "---|" * len(columns), *lines[1:]]) + "\n"
 
 
@@ -101,25 +101,23 @@ def landmark_cells(judged, name):
     return [distance, *[both(key, form) for key, form, _ in LANDMARK_COLUMNS]]
 
 
-def bench_cells(result):
-    (values,) = result["rows"].values()
-    if "cells" in values:
-        return values["cells"]
-    rows = [[name, f"{stage['p50_ms']:.1f}", f"{stage['p99_ms']:.1f}",
-             f"{stage['p50_yardsticks']:.2f}, {stage['p99_yardsticks']:.2f}"]
-            for name, stage in values["stages"].items()]
-    return [*rows, ["process, a frame (mean)", "", "", f"{values['process_cpu_yardsticks']:.2f}"]]
+def of_cells(make):
+    """A renderer from a function that returns columns and rows."""
+    return lambda table, result: grid(*make(table, result))
 
 
-def bench(table, result):
-    return grid(["CPU time of the thread", "p50 ms", "p99 ms", "p50, p99 in yardsticks"], bench_cells(result))
-
-
-def by_hand(table, result):
+def carried(table, result):
+    """Cells that were read off a text once, until the table's commands have run."""
     return "\n".join(grid(values["columns"], values["cells"]) for values in result["rows"].values())
 
 
-KINDS = {"accuracy": accuracy, "scenes": scenes, "pairs": pairs, "bench": bench, "by_hand": by_hand}
+OF_CELLS = (cells.bench, cells.work, cells.gaps, cells.odometry_gaps, cells.threads, cells.beside_load, cells.memory,
+            cells.endless, cells.hil)
+KINDS = {"accuracy": accuracy, "scenes": scenes, "pairs": pairs, **{make.__name__: of_cells(make) for make in OF_CELLS}}
+
+
+def is_carried(result):
+    return "cells" in next(iter(result["rows"].values()))
 
 
 def made_line(made):
@@ -134,9 +132,14 @@ def block(table, result):
     """What stands between the markers of a table."""
     if result is None:
         return "Not made yet.\n"
-    rendered = by_hand if "cells" in next(iter(result["rows"].values())) else KINDS[table.kind]
+    rendered = carried if is_carried(result) else KINDS[table.kind]
     commands = "\n".join(shown(command) for command in result["made"]["commands"])
     return f"```\n{commands}\n```\n{made_line(result['made'])}\n{rendered(table, result)}"
+
+
+def rows_of(make, result):
+    """The rows of a result whose figures stand in the headline, read off a text or made."""
+    return next(iter(result["rows"].values()))["cells"] if is_carried(result) else make(None, result)[1]
 
 
 def headline(results):
@@ -148,8 +151,7 @@ def headline(results):
     kitti = results["recordings"]["rows"][drive.label]["final"]
     far = next(iter(results["offsets_kitti"]["rows"].values()))["pairs"]
     depths = [statistics.median(figures.p90_depth_m(pair[mode]) for pair in far) for mode in MODES]
-    tracking = next(cells for cells in bench_cells(results["bench"]) if cells[0].startswith("tracking"))
-    memory = next(iter(results["memory"]["rows"].values()))["cells"][0]
+    tracking, memory = rows_of(cells.bench, results["bench"])[0], rows_of(cells.memory, results["memory"])[0]
     return grid(["what", "figure", "table, commit"], [
         [f"RMS position error, {drive.label}, {100 * kitti['share']:.0f} % of the frames, aligned by scale",
          f"{metres(kitti['ate_rmse_m'])} m; ORB-SLAM3 {drive.given.replace('..', 'to')} m", at("recordings")],

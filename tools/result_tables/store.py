@@ -40,18 +40,24 @@ def save(result, folder=FOLDER):
     os.replace(scratch, path)
 
 
+# Lists of figures that a row may hold, one at most.
+LISTS = ("pairs", "runs", "tests", "scenarios")
+
+
 def dump(result):
-    """One line a row or pair, so that a diff shows which changed."""
-    lines = []
-    for name, values in result["rows"].items():
-        text = json.dumps(values)
-        if "pairs" in values:
-            rest = json.dumps({key: value for key, value in values.items() if key != "pairs"})
-            opening = "{" if rest == "{}" else rest[:-1] + ", "
-            text = opening + '"pairs": [\n' + ",\n".join(json.dumps(pair) for pair in values["pairs"]) + "]}"
-        lines.append(f"{json.dumps(name)}: {text}")
+    """One line a row, or an item of its list, so that a diff shows which changed."""
+    lines = [f"{json.dumps(name)}: {dumped_row(values)}" for name, values in result["rows"].items()]
     head = json.dumps({key: value for key, value in result.items() if key != "rows"}, indent=1)
     return head[:-2] + ',\n "rows": {\n' + ",\n".join(lines) + "\n}}\n"
+
+
+def dumped_row(values):
+    name = next((name for name in LISTS if name in values), None)
+    if name is None:
+        return json.dumps(values)
+    rest = json.dumps({key: value for key, value in values.items() if key != name})
+    opening = "{" if rest == "{}" else rest[:-1] + ", "
+    return opening + f'"{name}": [\n' + ",\n".join(json.dumps(item) for item in values[name]) + "]}"
 
 
 def machine(cpuinfo=pathlib.Path("/proc/cpuinfo")):
@@ -113,3 +119,15 @@ def age(table, result, today=None, root=ROOT):
 def commits_since(head, paths, root=ROOT):
     count = git("rev-list", "--count", f"{head['commit']}..HEAD", "--", *paths, root=root)
     return f" in {count} commit{'' if count == '1' else 's'}" if count not in (None, "0") else ""
+
+
+def is_of(table, result, commit):
+    """Whether the table was made by its present commands, with the build of this commit."""
+    return (result is not None and not result["made"].get("carried_over")
+            and result["made"]["commands"] == table.commands and result["made"]["commit"].startswith(commit))
+
+
+def minutes(table, result):
+    """What the table takes: as measured, where programs made it by its present commands."""
+    measured = result and result["made"]["seconds"] and result["made"]["commands"] == table.commands
+    return result["made"]["seconds"] / 60 if measured else table.minutes
