@@ -5,9 +5,11 @@
 usage: results_cells_test.py SOURCE_FOLDER
 """
 
+import argparse
 import json
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -63,6 +65,16 @@ class Cells(unittest.TestCase):
         found = {"gaps": 16, "judged": 15, "kept": 13, "resets": 6, "worst_m": 0.3456}
         self.assertEqual(self.table("odometry_gaps", {"S": {"tests": [recorded("town", found, False)]}}),
                          ["| `town`, 40 s | 15 of 16 | 13 | 6 | 0.346 | **fails** |"])
+
+    def test_searching_pools_the_frames_of_all_rows(self):
+        def row(tracking, searching, lost):
+            return {"cpu_ms": {"tracking": tracking, "searching": searching, "lost": lost}, "valid": 9, "frames": 20}
+        rows = {"KITTI": row([float(ms) for ms in range(1, 101)], [50.0] * 98 + [120.0, 200.0], [7.0, 30.0]),
+                "EuRoC": row([10.0] * 100, [5.0] * 50, [4.0])}
+        self.assertEqual(self.table("searching", rows), [
+            "| KITTI | 100, 100 | 51.0, 100.0 | 50.0, 200.0 | 2.00 | 30.0 | 9 of 20 |",
+            "| EuRoC | 100, 50 | 10.0, 10.0 | 5.0, 5.0 | 0.50 | 4.0 | 9 of 20 |",
+            "| all | 200, 150 | 10.0, 99.0 | 50.0, 120.0 | 1.21 | 30.0 |  |"])
 
     def test_threads(self):
         rows = {"KITTI, 1": {"load": {"computing": 8}, "runs": [live_run(0.199), live_run(0.2554), live_run(0.21)]},
@@ -240,6 +252,32 @@ class LiveRuns(unittest.TestCase):
         done = self.run_script()
         self.assertEqual(done.returncode, 1)
         self.assertIn("farpointd ended with status 2: no such log", done.stderr)
+
+
+class LostRuns(unittest.TestCase):
+    lost_runs = script("lost_runs")
+
+    @staticmethod
+    def image(k):
+        return b"f" * 8 + struct.pack(">qq", 100 * k, k) + bytes([k]) * 40
+
+    def test_images_of_elsewhere_keep_their_own_times_and_numbers(self):
+        events = [("CAMERA_0", self.image(k)) for k in range(30)]
+        events.insert(7, ("IMU", b"an inertial sample"))
+        made = self.lost_runs.replaced(events, 0.5, argparse.Namespace(first=10, lost=4, seen=6))
+        images = [data for channel, data in made if channel == "CAMERA_0"]
+        self.assertEqual([struct.unpack_from(">qq", data, 8) for data in images], [(100 * k, k) for k in range(30)])
+        shown = [data[-1] for data in images]
+        self.assertEqual(shown[10:14], [25, 26, 27, 28])
+        self.assertEqual(shown[20:24], [5, 6, 7, 8])
+        self.assertEqual(shown[:10] + shown[14:20] + shown[24:], [*range(10), *range(14, 20), *range(24, 30)])
+        self.assertEqual(made[7], events[7])
+
+    def test_a_frame_searches_where_the_one_before_had_no_pose(self):
+        states = [3, 3, 4, 5, 6, 6, 3, 3]
+        frames = [(state, state in (3, 4), float(k)) for k, state in enumerate(states)]
+        self.assertEqual(self.lost_runs.sort_out(frames),
+                         {"tracking": [1.0, 2.0, 7.0], "lost": [3.0], "searching": [4.0, 5.0, 6.0]})
 
 
 if __name__ == "__main__":

@@ -94,6 +94,28 @@ def odometry_gaps(table, result):
             "worst error without that, m", "the test"], rows
 
 
+def searching(table, result):
+    """CPU of a frame by what the frame was, pooled over all rows, and for each of them."""
+    rows = list(result["rows"].items())
+    pooled = {kind: [ms for _, values in rows for ms in values["cpu_ms"][kind]] for kind in rows[0][1]["cpu_ms"]}
+    named = [(label, values["cpu_ms"], f"{values['valid']} of {values['frames']}") for label, values in rows]
+    return ["recording", "frames that track, search", "tracking p50, p99 ms", "searching p50, p99 ms", "ratio of p99",
+            "tracking is lost, worst ms", "frames valid"], [
+                searching_cells(*row) for row in [*named, ("all", pooled, "")]]
+
+
+def searching_cells(label, cpu_ms, valid):
+    ends = {kind: [percentile(cpu_ms[kind], p) for p in (50, 99)] for kind in ("tracking", "searching")}
+    return [label, f"{len(cpu_ms['tracking'])}, {len(cpu_ms['searching'])}",
+            *[", ".join(f"{ms:.1f}" for ms in ends[kind]) for kind in ("tracking", "searching")],
+            f"{ends['searching'][1] / ends['tracking'][1]:.2f}", f"{max(cpu_ms['lost']):.1f}", valid]
+
+
+def percentile(values, percent):
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, percent * len(ordered) // 100)]
+
+
 def beside(load):
     return ", ".join(f"{count} {kind}" for kind, count in load.items()) or "nothing"
 

@@ -60,8 +60,8 @@ KEEP = {
     "accuracy": lambda printed: figures.repeatable(printed["runs"][0]),
     "scenes": lambda printed: {key: printed["scenes"][0][key] for key in ("abs_z_p95", "pairs")},
     "pairs": lambda printed: {"pairs": printed["pairs"]},
-    "bench": as_printed, "work": as_printed, "gaps": as_printed, "odometry_gaps": as_printed, "threads": figures.live,
-    "memory": figures.live, "endless": as_printed, "beside_load": figures.live, "hil": as_printed,
+    "bench": as_printed, "work": as_printed, "gaps": as_printed, "odometry_gaps": as_printed, "searching": as_printed,
+    "threads": figures.live, "memory": figures.live, "endless": as_printed, "beside_load": figures.live, "hil": as_printed,
 }
 
 

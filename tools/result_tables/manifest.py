@@ -122,6 +122,10 @@ TABLES = (
         (*ESTIMATOR, "tools/report", "tools/simulate", "config/worlds/town.yaml"), timed=True, minutes=2),
     recorded_tests("gaps", "gaps", "test_replay", "RecordedGapsLong", minutes=2),
     recorded_tests("odometry_gaps", "odometry_gaps", "test_replay", "RecordedOdometryGapsLong", minutes=6),
+    Table("searching", "searching", (
+        Row("KITTI 03, first half", (KITTI, "tools/lost_runs run.lcm")),
+        Row("EuRoC MH_01, part, camera 0", (EUROC, "tools/lost_runs run.lcm")),
+    ), (*ESTIMATOR, "tools/lost_runs"), timed=True, minutes=2),
     Table("threads", "threads", (
         live("KITTI 03 half (9.7 Hz), 1", KITTI, "--speed 1 --runs 3 --computing 8"),
         live("KITTI 03 half, 2 and 3", KITTI, "--speed 2,3 --runs 2"),

@@ -111,8 +111,8 @@ def carried(table, result):
     return "\n".join(grid(values["columns"], values["cells"]) for values in result["rows"].values())
 
 
-OF_CELLS = (cells.bench, cells.work, cells.gaps, cells.odometry_gaps, cells.threads, cells.beside_load, cells.memory,
-            cells.endless, cells.hil)
+OF_CELLS = (cells.bench, cells.work, cells.gaps, cells.odometry_gaps, cells.searching, cells.threads, cells.beside_load,
+            cells.memory, cells.endless, cells.hil)
 KINDS = {"accuracy": accuracy, "scenes": scenes, "pairs": pairs, **{make.__name__: of_cells(make) for make in OF_CELLS}}
 
 
