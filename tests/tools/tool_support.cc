@@ -13,6 +13,7 @@
 #include "ipc/image_encoder.h"
 #include "slam/geometry/se3.h"
 #include "tests/support/paths.h"
+#include "tools/common/errors.h"
 
 namespace farpoint::tools {
 
@@ -53,6 +54,22 @@ std::string make_image(const std::string& extension, int width_px, int height_px
   const ipc::GreyPixels image{width_px, height_px, pixels};
   const auto bytes = extension == ".png" ? ipc::encode_png(image) : ipc::encode_jpeg(image, kQuality);
   return {bytes.begin(), bytes.end()};
+}
+
+std::string complaint_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const InputError& e) {
+    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos) << "more than one line";
+    return e.what();
+  }
+  ADD_FAILURE() << "no InputError";
+  return "";
+}
+
+void expect_all_in(const std::string& message, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
 }
 
 ProgramResult run_shell(const std::string& command) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <functional>
 #include <random>
 #include <string>
 #include <vector>
@@ -33,6 +34,10 @@ void put(const std::filesystem::path& file, const std::string& content);
 // Replaces the first occurrence of `from` in a file; the test fails where there is none.
 void replace_in(const std::filesystem::path& file, const std::string& from, const std::string& to);
 [[nodiscard]] std::string make_image(const std::string& extension, int width_px, int height_px, int shade);
+
+// The message of the InputError that `action` must throw: one line.
+[[nodiscard]] std::string complaint_of(const std::function<void()>& action);
+void expect_all_in(const std::string& message, const std::vector<std::string>& parts);
 
 struct ProgramResult {
   int status = -1;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <map>
 #include <memory>
 
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
 #include "tools/import/euroc.h"
+#include "tools/import/images.h"
 #include "tools/import/kitti.h"
 #include "tools/import/recording_log.h"
 #include "tools/import/tum.h"
@@ -16,6 +18,7 @@ namespace {
 struct ImportOptions {
   std::string folder, sequence, camera_file, output;
   std::int64_t first = 0, frames = 0;
+  PictureTimes times;
 };
 
 void print_summary(const Recording& recording, const std::string& output) {
@@ -46,10 +49,51 @@ CLI::App* add_layout(CLI::App* import, const char* name, const char* description
   return layout;
 }
 
+int import_images(const ImportOptions& options) {
+  StampUnit unit = StampUnit::kAuto;
+  Recording recording = read_images(options.folder, options.camera_file, options.times, &unit);
+  const bool chosen = options.times.unit == StampUnit::kAuto && unit != StampUnit::kAuto;
+  const double rate_hz = recording.cameras[0].rate_hz;
+  const int status = write_and_report(std::move(recording), options);
+  if (chosen)
+    std::printf("stamps were read as %s (%.4g pictures a second); --unit chooses another unit\n",
+                to_string(unit), rate_hz);
+  return status;
+}
+
+void add_images_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
+  CLI::App* images =
+      add_layout(import, "images", "A folder of PNG or JPEG pictures of one camera", options.get());
+  images->add_option("--camera", options->camera_file, "Camera file, as in config/cameras")->required();
+  CLI::Option* rate = images->add_option("--rate", options->times.rate_hz, "Pictures a second");
+  images
+      ->add_option(
+          "--times", options->times.stamps,
+          "Text file with one stamp for each picture, or lines 'stamp name'; 'names': the files' names "
+          "are the stamps")
+      ->excludes(rate);
+  static const std::map<std::string, StampUnit> kUnits = {{"auto", StampUnit::kAuto},
+                                                          {"s", StampUnit::kSeconds},
+                                                          {"ms", StampUnit::kMilliseconds},
+                                                          {"us", StampUnit::kMicroseconds},
+                                                          {"ns", StampUnit::kNanoseconds}};
+  images
+      ->add_option("--unit", options->times.unit, "Unit of the stamps: auto, s, ms, us or ns (default auto)")
+      ->transform(CLI::CheckedTransformer(kUnits).description(""));
+  images->footer(
+      "Pictures are taken in the order of their names; numbers compare as numbers (9 before 10). Other "
+      "files\n"
+      "are skipped. 'auto' takes the unit in which pictures are 2 ms to 2 s apart, and prints it.\n"
+      "Examples:\n"
+      "  farpoint import images /data/drive --rate 30 --camera front.yaml -o drive.lcm\n"
+      "  farpoint import images /data/drive --times names --camera front.yaml -o drive.lcm");
+  images->callback([=] { *action = [=] { return import_images(*options); }; });
+}
+
 }  // namespace
 
 void add_import_command(CLI::App* app, Action* action) {
-  CLI::App* import = app->add_subcommand("import", "Turn a recording of a public data set into an LCM log");
+  CLI::App* import = app->add_subcommand("import", "Turn a recording into an LCM log");
   import->require_subcommand(1);
   import->footer(
       "The log holds CALIBRATION first, then IMU, GROUND_TRUTH and CAMERA_N in the order of their times; "
@@ -61,7 +105,8 @@ void add_import_command(CLI::App* app, Action* action) {
       "Examples:\n"
       "  farpoint import kitti /data/kitti 03 -o kitti03.lcm\n"
       "  farpoint import euroc /data/euroc/MH_01_easy -o mh01.lcm\n"
-      "  farpoint import tum /data/tum/freiburg1_rpy --camera config/cameras/tum-freiburg1.yaml -o rpy.lcm");
+      "  farpoint import tum /data/tum/freiburg1_rpy --camera config/cameras/tum-freiburg1.yaml -o rpy.lcm\n"
+      "  farpoint import images /data/drive --rate 30 --camera front.yaml -o drive.lcm");
 
   const auto options = std::make_shared<ImportOptions>();
   CLI::App* kitti = add_layout(import, "kitti", "KITTI odometry: DIR/sequences/SEQUENCE", options.get());
@@ -89,6 +134,8 @@ void add_import_command(CLI::App* app, Action* action) {
       return write_and_report(read_tum_rgbd(options->folder, options->camera_file), *options);
     };
   });
+
+  add_images_command(import, options, action);
 }
 
 }  // namespace farpoint::tools

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <span>
 
+#include "daemon/config/camera_file.h"
 #include "ipc/image_codec.h"
+#include "ipc/log.h"
 #include "slam/geometry/rig.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
@@ -32,6 +34,29 @@ double median_rate_hz(const Recording& recording, int camera) {
 
 }  // namespace
 
+void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording) {
+  const daemon::CameraFile content = daemon::read_camera_file(camera_file);
+  RecordingCamera camera;
+  camera.name = name;
+  camera.parameters = content.parameters;
+  camera.T_body_camera = content.T_body_camera.value_or(forward_looking_T_body_camera());
+  camera.rate_hz = content.rate_hz;
+  camera.row_time_s = content.row_time_s;
+  if (content.T_body_camera) recording->body_name = "body";
+  recording->cameras.push_back(std::move(camera));
+}
+
+std::string read_image_file(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kMostBytes = ipc::LogReader::kMaxDataBytes - 1024;  // the message's other fields
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, absent);
+  if (!absent && bytes > kMostBytes) {
+    throw InputError(file.string() + ": " + std::to_string(bytes >> 20) +
+                     " MiB, expected an image file of less than 64 MiB");
+  }
+  return read_file(file);
+}
+
 ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file) {
   const std::span data(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   const std::optional<ipc::ImageInfo> info = ipc::probe_image(data);
@@ -50,7 +75,7 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
     const int index = static_cast<int>(c);
     if (camera.parameters.width_px == 0) {
       const std::filesystem::path& file = first_image_of(*recording, index).file;
-      const ipc::ImageInfo info = probe_image_file(read_file(file), file);
+      const ipc::ImageInfo info = probe_image_file(read_image_file(file), file);
       camera.parameters.width_px = info.width_px;
       camera.parameters.height_px = info.height_px;
     }

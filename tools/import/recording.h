@@ -64,6 +64,12 @@ struct Recording {
 // Rotation of a camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
 [[nodiscard]] slam::SE3 forward_looking_T_body_camera();
 
+// Adds the camera of a camera file, and the body where the file names one. Without a body the camera looks
+// along the body's x axis, upright. Throws InputError naming the file.
+void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording);
+
+// The bytes of an image file. Throws InputError for one that a log would not hold.
+[[nodiscard]] std::string read_image_file(const std::filesystem::path& file);
 // Reads format and size from the header of an image file. Throws InputError naming `file`.
 [[nodiscard]] ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file);
 

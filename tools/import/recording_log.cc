@@ -10,7 +10,6 @@
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
-#include "tools/common/text_file.h"
 
 namespace farpoint::tools {
 namespace {
@@ -82,7 +81,7 @@ ground_truth_t to_message(const RecordingTruth& truth, bool has_orientation) {
 }
 
 image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
-  const std::string bytes = read_file(image.file);
+  const std::string bytes = read_image_file(image.file);
   const ipc::ImageInfo info = probe_image_file(bytes, image.file);
   if (info.width_px != camera.parameters.width_px || info.height_px != camera.parameters.height_px) {
     throw InputError(image.file.string() + ": expected " + std::to_string(camera.parameters.width_px) + "x" +
