@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 
+#include "ipc/printable.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
 #include "tools/import/euroc.h"
@@ -35,6 +36,8 @@ int write_and_report(Recording recording, const ImportOptions& options) {
     keep_part(options.first, options.frames, options.folder, &recording);
   write_recording(recording, options.output);
   print_summary(recording, options.output);
+  for (const std::string& notice : recording.notices)
+    std::fprintf(stderr, "farpoint: %s\n", ipc::printable(notice).c_str());
   return kExitDone;
 }
 
@@ -64,7 +67,10 @@ int import_images(const ImportOptions& options) {
 void add_images_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
   CLI::App* images =
       add_layout(import, "images", "A folder of PNG or JPEG pictures of one camera", options.get());
-  images->add_option("--camera", options->camera_file, "Camera file, as in config/cameras")->required();
+  images
+      ->add_option("--camera", options->camera_file,
+                   "Camera file (config/cameras), or a calibration of ROS, Kalibr or OpenCV")
+      ->required();
   CLI::Option* rate = images->add_option("--rate", options->times.rate_hz, "Pictures a second");
   images
       ->add_option(
@@ -127,7 +133,9 @@ void add_import_command(CLI::App* app, Action* action) {
   euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder), *options); }; });
 
   CLI::App* tum = add_layout(import, "tum", "TUM RGB-D: DIR holds rgb.txt", options.get());
-  tum->add_option("--camera", options->camera_file, "Camera file, as in config/cameras")->required();
+  tum->add_option("--camera", options->camera_file,
+                  "Camera file (config/cameras), or a calibration of ROS, Kalibr or OpenCV")
+      ->required();
   tum->footer("Reads rgb.txt and groundtruth.txt where there is one. Depth is not read.");
   tum->callback([=] {
     *action = [=] {

@@ -148,6 +148,7 @@ void read_truth(const fs::path& file, Recording* recording) {
 }
 
 fs::path find_mav0(const fs::path& root) {
+  require_folder(root, "mav0, an EuRoC recording");
   if (fs::is_directory(root / "mav0" / "cam0")) return root / "mav0";
   if (fs::is_directory(root / "cam0")) return root;
   throw InputError(root.string() +

@@ -203,12 +203,6 @@ void add_at_stamps(const std::vector<Stamp>& stamps, StampUnit unit, Recording* 
   }
 }
 
-void check_folder(const fs::path& folder) {
-  if (!fs::exists(folder)) throw InputError(folder.string() + ": no such folder, expected one with pictures");
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string() + ": is a file, expected a folder with pictures");
-}
-
 void check_times(const PictureTimes& times) {
   const bool has_rate = times.rate_hz != 0.0, has_stamps = !times.stamps.empty();
   if (has_rate == has_stamps) throw InputError("import images: expected one of --rate HZ and --times FILE");
@@ -263,7 +257,7 @@ bool name_less(const std::string& a, const std::string& b) {
 Recording read_images(const fs::path& folder, const fs::path& camera_file, const PictureTimes& times,
                       StampUnit* unit_used) {
   check_times(times);
-  check_folder(folder);
+  require_folder(folder, "pictures");
   Recording recording;
   add_camera(camera_file, "camera", &recording);
   const std::vector<fs::path> pictures = list_pictures(folder);

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "daemon/config/camera_file.h"
+#include "ipc/file_kind.h"
 #include "ipc/image_codec.h"
 #include "ipc/log.h"
 #include "slam/geometry/rig.h"
@@ -34,6 +35,15 @@ double median_rate_hz(const Recording& recording, int camera) {
 
 }  // namespace
 
+void require_folder(const std::filesystem::path& folder, const std::string& wanted) {
+  if (std::filesystem::is_directory(folder)) return;
+  if (!std::filesystem::exists(folder))
+    throw InputError(folder.string() + ": no such folder, expected one that holds " + wanted);
+  const std::string wrong = ipc::wrong_kind(folder.string(), "a folder that holds " + wanted);
+  throw InputError(!wrong.empty() ? wrong
+                                  : folder.string() + ": is a file, expected a folder that holds " + wanted);
+}
+
 void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording) {
   const daemon::CameraFile content = daemon::read_camera_file(camera_file);
   RecordingCamera camera;
@@ -43,6 +53,8 @@ void add_camera(const std::filesystem::path& camera_file, const std::string& nam
   camera.rate_hz = content.rate_hz;
   camera.row_time_s = content.row_time_s;
   if (content.T_body_camera) recording->body_name = "body";
+  for (const std::string& notice : content.notices)
+    recording->notices.push_back(camera_file.string() + ": " + notice);
   recording->cameras.push_back(std::move(camera));
 }
 

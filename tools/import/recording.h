@@ -58,11 +58,16 @@ struct Recording {
   std::vector<RecordingImu> imu;       // ascending in time
   std::vector<RecordingTruth> truth;   // ascending in time
   bool truth_has_orientation = true;
-  std::size_t missing_images = 0;  // listed, but without a file, or on one side of a stereo pair only
+  std::vector<std::string> notices;  // what a person should know, a line each
+  std::size_t missing_images = 0;    // listed, but without a file, or on one side of a stereo pair only
 };
 
 // Rotation of a camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
 [[nodiscard]] slam::SE3 forward_looking_T_body_camera();
+
+// Throws InputError unless `folder` is one; `wanted` is what it should hold. Files of other recorders are
+// named.
+void require_folder(const std::filesystem::path& folder, const std::string& wanted);
 
 // Adds the camera of a camera file, and the body where the file names one. Without a body the camera looks
 // along the body's x axis, upright. Throws InputError naming the file.

@@ -47,8 +47,7 @@ void read_truth(const fs::path& file, Recording* recording) {
 }  // namespace
 
 Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file) {
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string() + ": no such folder, expected one that holds rgb.txt");
+  require_folder(folder, "rgb.txt");
   Recording recording;
   add_camera(camera_file, "rgb", &recording);
   read_images(folder, &recording);
