@@ -69,7 +69,7 @@ std::optional<FileKind> recognise_file(std::span<const std::uint8_t> head) {
   return {};
 }
 
-std::string wrong_kind(int fd, const std::string& file, const std::string& wanted) {
+std::string wrong_kind(int fd, const std::string& file, const std::string& wanted, bool with_advice) {
   struct stat info {};
   std::array<std::uint8_t, kKindBytes> head{};
   if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return {};
@@ -77,14 +77,14 @@ std::string wrong_kind(int fd, const std::string& file, const std::string& wante
   if (got <= 0) return {};
   const auto kind = recognise_file({head.data(), static_cast<std::size_t>(got)});
   if (!kind) return {};
-  const std::string advice = kind->advice;
+  const std::string advice = with_advice ? kind->advice : "";
   return file + ": " + kind->name + ", expected " + wanted + (advice.empty() ? "" : "; " + advice);
 }
 
-std::string wrong_kind(const std::string& file, const std::string& wanted) {
+std::string wrong_kind(const std::string& file, const std::string& wanted, bool with_advice) {
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return {};
-  const std::string text = wrong_kind(fd, file, wanted);
+  const std::string text = wrong_kind(fd, file, wanted, with_advice);
   close(fd);
   return text;
 }

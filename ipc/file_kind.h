@@ -22,8 +22,10 @@ inline constexpr std::size_t kKindBytes = 64;
 
 // "FILE: a ROS 1 bag, expected WANTED; <advice>" for a file of a known kind; empty for others, and for what
 // cannot be read or is no regular file.
-[[nodiscard]] std::string wrong_kind(const std::string& file, const std::string& wanted);
+[[nodiscard]] std::string wrong_kind(const std::string& file, const std::string& wanted,
+                                     bool with_advice = true);
 // The same for an open file; its position stays.
-[[nodiscard]] std::string wrong_kind(int fd, const std::string& file, const std::string& wanted);
+[[nodiscard]] std::string wrong_kind(int fd, const std::string& file, const std::string& wanted,
+                                     bool with_advice = true);
 
 }  // namespace farpoint::ipc

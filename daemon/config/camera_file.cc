@@ -233,7 +233,7 @@ std::filesystem::path split_name(const std::filesystem::path& file, std::string*
 CameraFile read_camera_file(const std::filesystem::path& file) {
   std::string name;
   const std::filesystem::path path = split_name(file, &name);
-  const std::string wrong = ipc::wrong_kind(path.string(), "a camera file");
+  const std::string wrong = ipc::wrong_kind(path.string(), "a camera file", false);
   if (!wrong.empty()) throw InputError(ipc::printable(wrong));
   return parse_camera_file(read_short_file(path), path, name);
 }

@@ -151,7 +151,7 @@ fs::path picture_of(const fs::path& folder, const FieldLine& line) {
 void check_size(const fs::path& file) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status) || fs::is_directory(status)) return;  // reading it says so
+  if (!fs::exists(status) || fs::is_directory(status)) return;  // refused by the reader
   const std::uintmax_t bytes = fs::file_size(file, error);
   if (error || bytes > kMaxStampFileBytes)
     throw InputError(file.string() + ": expected a text file of stamps of at most 64 MiB");
