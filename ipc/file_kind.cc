@@ -23,11 +23,12 @@ using namespace std::string_view_literals;
 constexpr const char* kUnpack = "unpack it first";
 constexpr const char* kPictures = "'farpoint import images' takes a folder of them";
 constexpr const char* kFrames = "ffmpeg turns it into a folder of pictures for 'farpoint import images'";
+constexpr const char* kRosBag = "'farpoint import bag' reads it";
 constexpr const char* kBag = "no import takes it yet: save its images as files for 'farpoint import images'";
 constexpr const char* kNothing = "";
 
 constexpr std::array kMagics = {
-    Magic{0, "#ROSBAG V"sv, {"a ROS 1 bag", kBag}},
+    Magic{0, "#ROSBAG V"sv, {"a ROS 1 bag", kRosBag}},
     Magic{0, "\x89MCAP0\r\n"sv, {"an MCAP recording", kBag}},
     Magic{0, "SQLite format 3\0"sv, {"an SQLite database (a ROS 2 bag has the name .db3)", kBag}},
     Magic{4, "ftyp"sv, {"an MP4 or MOV video", kFrames}},

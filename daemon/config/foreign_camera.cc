@@ -25,7 +25,7 @@ std::string key_of(const YamlFile& yaml, std::span<const char* const> keys) {
 }
 
 std::string required_key(const YamlFile& yaml, std::span<const char* const> keys) {
-  const std::string key = key_of(yaml, keys);
+  std::string key = key_of(yaml, keys);
   if (key.empty()) throw InputError(yaml.path().string() + ": key '" + std::string(keys[0]) + "' is missing");
   return key;
 }

@@ -34,7 +34,7 @@ std::string read_short_file(const std::filesystem::path& file) {
   return content;
 }
 
-YamlFile::YamlFile(std::filesystem::path file) : YamlFile(file, read_short_file(file)) {}
+YamlFile::YamlFile(const std::filesystem::path& file) : YamlFile(file, read_short_file(file)) {}
 
 YamlFile::YamlFile(std::filesystem::path file, const std::string& content) : path_(std::move(file)) {
   if (content.size() > kMaxYamlBytes) refuse_length(path_);

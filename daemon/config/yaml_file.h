@@ -21,7 +21,7 @@ class YamlFile {
  public:
   // Throws InputError if the file cannot be read, is longer than kMaxYamlBytes, is no YAML, or its top is no
   // map. Every error is one line.
-  explicit YamlFile(std::filesystem::path file);
+  explicit YamlFile(const std::filesystem::path& file);
   // Reads a file's content; `file` names it in errors.
   YamlFile(std::filesystem::path file, const std::string& content);
 

@@ -7,6 +7,7 @@
 #include "ipc/printable.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
+#include "tools/import/bag.h"
 #include "tools/import/euroc.h"
 #include "tools/import/images.h"
 #include "tools/import/kitti.h"
@@ -20,6 +21,8 @@ struct ImportOptions {
   std::string folder, sequence, camera_file, output;
   std::int64_t first = 0, frames = 0;
   PictureTimes times;
+  BagChoice bag;
+  bool list = false;
 };
 
 void print_summary(const Recording& recording, const std::string& output) {
@@ -41,15 +44,20 @@ int write_and_report(Recording recording, const ImportOptions& options) {
   return kExitDone;
 }
 
+// The options of every layout except the name of what is read and --output.
+CLI::App* add_part(CLI::App* layout, ImportOptions* options) {
+  layout->add_option("--first", options->first, "Start at this frame, counted from 0")->capture_default_str();
+  layout->add_option("--frames", options->frames, "Number of frames; 0: all that follow")
+      ->capture_default_str();
+  return layout;
+}
+
 CLI::App* add_layout(CLI::App* import, const char* name, const char* description, ImportOptions* options) {
   CLI::App* layout = import->add_subcommand(name, description);
   layout->add_option("DIR", options->folder, "Folder of the recording")->required();
   layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
       ->required();
-  layout->add_option("--first", options->first, "Start at this frame, counted from 0")->capture_default_str();
-  layout->add_option("--frames", options->frames, "Number of frames; 0: all that follow")
-      ->capture_default_str();
-  return layout;
+  return add_part(layout, options);
 }
 
 int import_images(const ImportOptions& options) {
@@ -94,6 +102,44 @@ void add_images_command(CLI::App* import, const std::shared_ptr<ImportOptions>& 
       "  farpoint import images /data/drive --rate 30 --camera front.yaml -o drive.lcm\n"
       "  farpoint import images /data/drive --times names --camera front.yaml -o drive.lcm");
   images->callback([=] { *action = [=] { return import_images(*options); }; });
+}
+
+int list_topics(const std::string& file) {
+  for (const BagTopic& topic : list_bag(file))
+    std::printf("%8llu  %-32s  %s\n", static_cast<unsigned long long>(topic.messages),
+                ipc::printable(topic.type).c_str(), ipc::printable(topic.name).c_str());
+  return kExitDone;
+}
+
+int import_bag(const ImportOptions& options) {
+  if (options.list) return list_topics(options.folder);
+  if (options.output.empty()) throw InputError("import bag: expected --output FILE, or --list");
+  BagChoice choice = options.bag;
+  choice.camera_file = options.camera_file;
+  return write_and_report(read_bag(options.folder, choice), options);
+}
+
+void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
+  CLI::App* bag = import->add_subcommand("bag", "A ROS 1 bag (version 2.0, not compressed)");
+  bag->add_option("FILE", options->folder, "The bag")->required();
+  bag->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced");
+  bag->add_flag("--list", options->list,
+                "Print the topics with type and number of messages, and write nothing");
+  bag->add_option("--image", options->bag.image, "Topic of the images (default: the only one)");
+  bag->add_option("--camera", options->camera_file,
+                  "Camera file or calibration (default: the topic camera_info beside the images)");
+  bag->add_option("--imu", options->bag.imu, "Topic of the IMU, or 'none' (default: the only one)");
+  bag->add_option(
+      "--wheels", options->bag.wheels,
+      "Topic of odometry or twist whose forward speed and yaw rate become WHEELS (default: none)");
+  add_part(bag, options.get());
+  bag->footer(
+      "Images of sensor_msgs/Image are stored as grey, those of CompressedImage as they are (PNG or JPEG).\n"
+      "A message's time is its header's. 'rosbag decompress' writes a bag without compression.\n"
+      "Examples:\n"
+      "  farpoint import bag drive.bag --list\n"
+      "  farpoint import bag drive.bag --image /cam0/image_raw -o drive.lcm");
+  bag->callback([=] { *action = [=] { return import_bag(*options); }; });
 }
 
 }  // namespace
@@ -144,6 +190,7 @@ void add_import_command(CLI::App* app, Action* action) {
   });
 
   add_images_command(import, options, action);
+  add_bag_command(import, options, action);
 }
 
 }  // namespace farpoint::tools

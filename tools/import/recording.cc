@@ -35,6 +35,24 @@ double median_rate_hz(const Recording& recording, int camera) {
 
 }  // namespace
 
+std::size_t bytes_a_pixel(RawEncoding encoding) {
+  switch (encoding) {
+    case RawEncoding::kRgb8:
+    case RawEncoding::kBgr8:
+      return 3;
+    case RawEncoding::kRgba8:
+    case RawEncoding::kBgra8:
+      return 4;
+    case RawEncoding::kUyvy8:
+    case RawEncoding::kYuyv8:
+      return 2;
+    case RawEncoding::kNone:
+    case RawEncoding::kGrey8:
+      break;
+  }
+  return 1;
+}
+
 void require_folder(const std::filesystem::path& folder, const std::string& wanted) {
   if (std::filesystem::is_directory(folder)) return;
   if (!std::filesystem::exists(folder))
@@ -45,7 +63,11 @@ void require_folder(const std::filesystem::path& folder, const std::string& want
 }
 
 void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording) {
-  const daemon::CameraFile content = daemon::read_camera_file(camera_file);
+  add_camera(daemon::read_camera_file(camera_file), camera_file.string(), name, recording);
+}
+
+void add_camera(const daemon::CameraFile& content, const std::string& origin, const std::string& name,
+                Recording* recording) {
   RecordingCamera camera;
   camera.name = name;
   camera.parameters = content.parameters;
@@ -53,8 +75,7 @@ void add_camera(const std::filesystem::path& camera_file, const std::string& nam
   camera.rate_hz = content.rate_hz;
   camera.row_time_s = content.row_time_s;
   if (content.T_body_camera) recording->body_name = "body";
-  for (const std::string& notice : content.notices)
-    recording->notices.push_back(camera_file.string() + ": " + notice);
+  for (const std::string& notice : content.notices) recording->notices.push_back(origin + ": " + notice);
   recording->cameras.push_back(std::move(camera));
 }
 
@@ -119,6 +140,7 @@ void keep_part(std::int64_t first, std::int64_t frames, const std::string& recor
     return sample.utime < from - kMargin_us || sample.utime > to + kMargin_us;
   };
   std::erase_if(recording->imu, outside);
+  std::erase_if(recording->wheels, outside);
   std::erase_if(recording->truth, outside);
 }
 
