@@ -85,7 +85,7 @@ std::string wrong_kind(int fd, const std::string& file, const std::string& wante
 std::string wrong_kind(const std::string& file, const std::string& wanted, bool with_advice) {
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return {};
-  const std::string text = wrong_kind(fd, file, wanted, with_advice);
+  std::string text = wrong_kind(fd, file, wanted, with_advice);
   close(fd);
   return text;
 }

@@ -25,7 +25,8 @@ struct Damage {
   std::function<void(const fs::path& root)> spoil;
   std::vector<std::string> complaint;
 };
-void PrintTo(const Damage& damage, std::ostream* out) {
+void PrintTo(const Damage& damage,
+             std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
   *out << damage.name;
 }
 

@@ -254,7 +254,8 @@ TEST(Program, JsonIsValid) {
 struct RealRecording {
   std::string name, arguments, truth, exported_with;
 };
-void PrintTo(const RealRecording& r, std::ostream* out) {
+void PrintTo(const RealRecording& r,
+             std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
   *out << r.name;
 }
 

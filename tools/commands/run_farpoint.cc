@@ -41,7 +41,7 @@ std::string unknown_command(const CLI::App& app, const std::string& word, const 
 // The same for the first word, and for the layout behind 'import'.
 std::string unknown_words(const CLI::App& app, int argc, const char* const* argv) {
   const std::string first = argc > 1 ? argv[1] : "", second = argc > 2 ? argv[2] : "";
-  const std::string unknown = unknown_command(app, first, "command");
+  std::string unknown = unknown_command(app, first, "command");
   if (!unknown.empty() || first != "import") return unknown;
   return unknown_command(*app.get_subcommand("import"), second, "import");
 }

@@ -11,7 +11,6 @@
 
 namespace farpoint::tools {
 
-using daemon::to_rigid_motion;
 using daemon::YamlFile;
 namespace {
 

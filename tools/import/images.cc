@@ -134,6 +134,7 @@ StampUnit unit_of(const std::vector<Stamp>& stamps) {
 
 std::vector<Stamp> stamps_of_names(const std::vector<fs::path>& pictures) {
   std::vector<Stamp> stamps;
+  stamps.reserve(pictures.size());
   for (const fs::path& picture : pictures)
     stamps.push_back({picture.stem().string(), picture.string(), picture});
   return stamps;
@@ -235,7 +236,7 @@ bool name_less(const std::string& a, const std::string& b) {
     while (*at < text.size() && text[*at] == '0') ++*at;
     const std::size_t begin = *at;
     while (*at < text.size() && is_digit(text[*at])) ++*at;
-    return std::string_view(text).substr(begin, *at - begin);
+    return std::string_view{text}.substr(begin, *at - begin);
   };
   std::size_t i = 0, k = 0;
   while (i < a.size() && k < b.size()) {
