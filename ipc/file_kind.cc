@@ -22,21 +22,21 @@ using namespace std::string_view_literals;
 
 constexpr const char* kUnpack = "unpack it first";
 constexpr const char* kPictures = "'farpoint import images' takes a folder of them";
-constexpr const char* kFrames = "ffmpeg turns it into a folder of pictures for 'farpoint import images'";
+constexpr const char* kVideo = "'farpoint import video' reads it";
 constexpr const char* kRosBag = "'farpoint import bag' reads it";
-constexpr const char* kBag = "no import takes it yet: save its images as files for 'farpoint import images'";
+constexpr const char* kDatabase = "'ros2 bag convert' writes it as MCAP for 'farpoint import bag'";
 constexpr const char* kNothing = "";
 
 constexpr std::array kMagics = {
     Magic{0, "#ROSBAG V"sv, {"a ROS 1 bag", kRosBag}},
-    Magic{0, "\x89MCAP0\r\n"sv, {"an MCAP recording", kBag}},
-    Magic{0, "SQLite format 3\0"sv, {"an SQLite database (a ROS 2 bag has the name .db3)", kBag}},
-    Magic{4, "ftyp"sv, {"an MP4 or MOV video", kFrames}},
-    Magic{4, "moov"sv, {"a MOV video", kFrames}},
-    Magic{0, "\x1a\x45\xdf\xa3"sv, {"a Matroska or WebM video", kFrames}},
-    Magic{8, "AVI "sv, {"an AVI video", kFrames}},
-    Magic{0, "\x00\x00\x01\xba"sv, {"an MPEG video", kFrames}},
-    Magic{0, "\x00\x00\x00\x01\x67"sv, {"an H.264 video", kFrames}},
+    Magic{0, "\x89MCAP0\r\n"sv, {"an MCAP recording", kRosBag}},
+    Magic{0, "SQLite format 3\0"sv, {"an SQLite database (a ROS 2 bag has the name .db3)", kDatabase}},
+    Magic{4, "ftyp"sv, {"an MP4 or MOV video", kVideo}},
+    Magic{4, "moov"sv, {"a MOV video", kVideo}},
+    Magic{0, "\x1a\x45\xdf\xa3"sv, {"a Matroska or WebM video", kVideo}},
+    Magic{8, "AVI "sv, {"an AVI video", kVideo}},
+    Magic{0, "\x00\x00\x01\xba"sv, {"an MPEG video", kVideo}},
+    Magic{0, "\x00\x00\x00\x01\x67"sv, {"an H.264 video", kVideo}},
     Magic{0, "\xd4\xc3\xb2\xa1"sv, {"a pcap network capture", kNothing}},
     Magic{0, "\xa1\xb2\xc3\xd4"sv, {"a pcap network capture", kNothing}},
     Magic{0, "\x4d\x3c\xb2\xa1"sv, {"a pcap network capture", kNothing}},

@@ -79,8 +79,12 @@ ProgramResult run_shell(const std::string& command) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, get(out), get(err)};
 }
 
+std::string program() {
+  return test::binary_dir() + "/bin/farpoint";
+}
+
 ProgramResult run_farpoint_program(const std::string& arguments) {
-  return run_shell(test::binary_dir() + "/bin/farpoint " + arguments);
+  return run_shell(program() + " " + arguments);
 }
 
 void make_kitti(const fs::path& root) {

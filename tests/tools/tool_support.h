@@ -45,6 +45,8 @@ struct ProgramResult {
 };
 // Runs a shell command line; run_farpoint_program puts the built farpoint before it.
 [[nodiscard]] ProgramResult run_shell(const std::string& command);
+// Path of the built farpoint.
+[[nodiscard]] std::string program();
 [[nodiscard]] ProgramResult run_farpoint_program(const std::string& arguments);
 
 // Small recordings of each layout: 5 frames of 64x48 pixels, stereo where the layout has it.

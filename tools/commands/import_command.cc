@@ -13,6 +13,7 @@
 #include "tools/import/kitti.h"
 #include "tools/import/recording_log.h"
 #include "tools/import/tum.h"
+#include "tools/import/video.h"
 
 namespace farpoint::tools {
 namespace {
@@ -34,10 +35,10 @@ void print_summary(const Recording& recording, const std::string& output) {
               recording.truth.size(), recording.truth_has_orientation ? "poses" : "positions");
 }
 
-int write_and_report(Recording recording, const ImportOptions& options) {
+int write_and_report(Recording recording, const ImportOptions& options, const ImageSource& source = {}) {
   if (options.first != 0 || options.frames != 0)
     keep_part(options.first, options.frames, options.folder, &recording);
-  write_recording(recording, options.output);
+  write_recording(recording, options.output, source);
   print_summary(recording, options.output);
   for (const std::string& notice : recording.notices)
     std::fprintf(stderr, "farpoint: %s\n", ipc::printable(notice).c_str());
@@ -120,7 +121,7 @@ int import_bag(const ImportOptions& options) {
 }
 
 void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
-  CLI::App* bag = import->add_subcommand("bag", "A ROS 1 bag (version 2.0, not compressed)");
+  CLI::App* bag = import->add_subcommand("bag", "A ROS 1 bag or an MCAP recording of ROS, not compressed");
   bag->add_option("FILE", options->folder, "The bag")->required();
   bag->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced");
   bag->add_flag("--list", options->list,
@@ -135,11 +136,38 @@ void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& opt
   add_part(bag, options.get());
   bag->footer(
       "Images of sensor_msgs/Image are stored as grey, those of CompressedImage as they are (PNG or JPEG).\n"
-      "A message's time is its header's. 'rosbag decompress' writes a bag without compression.\n"
+      "A message's time is its header's. 'rosbag decompress' and 'mcap decompress' write files without "
+      "compression.\n"
       "Examples:\n"
       "  farpoint import bag drive.bag --list\n"
       "  farpoint import bag drive.bag --image /cam0/image_raw -o drive.lcm");
   bag->callback([=] { *action = [=] { return import_bag(*options); }; });
+}
+
+int import_video(const ImportOptions& options) {
+  Recording recording = read_video(options.folder, options.camera_file, options.times.rate_hz);
+  const slam::Camera::Parameters& camera = recording.cameras[0].parameters;
+  VideoFrames frames(options.folder, camera.width_px, camera.height_px);
+  return write_and_report(std::move(recording), options,
+                          [&](const RecordingImage& image) { return frames.frame(image.sequence); });
+}
+
+void add_video_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
+  CLI::App* video =
+      import->add_subcommand("video", "A video file, decoded by the programs of the package ffmpeg");
+  video->add_option("FILE", options->folder, "The video")->required();
+  video->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
+      ->required();
+  video
+      ->add_option("--camera", options->camera_file,
+                   "Camera file (config/cameras), or a calibration of ROS, Kalibr or OpenCV")
+      ->required();
+  video->add_option("--rate", options->times.rate_hz, "Frames a second (default: the video's own times)");
+  add_part(video, options.get());
+  video->footer(
+      "Frames become grey PNG images of the size in the file, whatever orientation the file asks for.\n"
+      "Example: farpoint import video drive.mp4 --camera front.yaml -o drive.lcm");
+  video->callback([=] { *action = [=] { return import_video(*options); }; });
 }
 
 }  // namespace
@@ -191,6 +219,7 @@ void add_import_command(CLI::App* app, Action* action) {
 
   add_images_command(import, options, action);
   add_bag_command(import, options, action);
+  add_video_command(import, options, action);
 }
 
 }  // namespace farpoint::tools

@@ -7,6 +7,7 @@
 
 #include "daemon/config/camera_file.h"
 #include "tools/common/errors.h"
+#include "tools/import/mcap.h"
 #include "tools/import/ros_bag.h"
 #include "tools/import/ros_message.h"
 
@@ -33,7 +34,7 @@ Bytes bytes_of(const std::string& text) {
 Topics topics_of(const ByteFile& file) {
   Topics topics;
   std::map<std::uint32_t, std::string> names;
-  read_ros_bag(
+  read_bag_file(
       file,
       [&](const BagConnection& connection) {
         names[connection.id] = connection.topic;
@@ -131,10 +132,12 @@ class Collector {
     if (choice.camera_file.empty()) camera_info_ = camera_info_topic(image_);
   }
 
-  void connect(const BagConnection& connection) { topic_of_[connection.id] = connection.topic; }
+  void connect(const BagConnection& connection) { connections_[connection.id] = connection; }
 
   void take(const BagMessage& message) {
-    const std::string& topic = topic_of_[message.connection];
+    const BagConnection& connection = connections_[message.connection];
+    const std::string& topic = connection.topic;
+    packing_ = connection.packing;
     if (topic == image_) {
       take_image(message);
     } else if (topic == imu_) {
@@ -142,7 +145,7 @@ class Collector {
     } else if (topic == wheels_) {
       take_wheels(message);
     } else if (topic == camera_info_ && calibration_.empty()) {
-      const std::optional<std::string> text = read_ros_camera_info(bytes_of(content(message)), kPacking);
+      const std::optional<std::string> text = read_ros_camera_info(bytes_of(content(message)), packing_);
       if (!text) file_.fail(message.offset, "a damaged message on " + camera_info_);
       calibration_ = *text;
     }
@@ -155,8 +158,6 @@ class Collector {
   [[nodiscard]] std::uint64_t damaged() const { return damaged_; }
 
  private:
-  static constexpr RosPacking kPacking = RosPacking::kRos1;
-
   [[nodiscard]] std::string content(const BagMessage& message) const {
     if (message.bytes > kMaxSmallMessageBytes)
       file_.fail(message.offset,
@@ -172,8 +173,8 @@ class Collector {
     const std::string head =
         file_.read(message.offset, std::min<std::uint64_t>(message.bytes, kImageHeadBytes));
     const std::optional<RosImage> found =
-        compressed_ ? read_ros_compressed_image(bytes_of(head), message.bytes, kPacking)
-                    : read_ros_image(bytes_of(head), message.bytes, kPacking);
+        compressed_ ? read_ros_compressed_image(bytes_of(head), message.bytes, packing_)
+                    : read_ros_image(bytes_of(head), message.bytes, packing_);
     if (!found) {
       ++damaged_;
       return;
@@ -203,7 +204,7 @@ class Collector {
   }
 
   void take_imu(const BagMessage& message) {
-    const std::optional<RosImu> found = read_ros_imu(bytes_of(content(message)), kPacking);
+    const std::optional<RosImu> found = read_ros_imu(bytes_of(content(message)), packing_);
     if (!found) {
       ++damaged_;
       return;
@@ -214,8 +215,8 @@ class Collector {
 
   void take_wheels(const BagMessage& message) {
     const std::string bytes = content(message);
-    const std::optional<RosTwist> found = wheels_are_odometry_ ? read_ros_odometry(bytes_of(bytes), kPacking)
-                                                               : read_ros_twist(bytes_of(bytes), kPacking);
+    const std::optional<RosTwist> found = wheels_are_odometry_ ? read_ros_odometry(bytes_of(bytes), packing_)
+                                                               : read_ros_twist(bytes_of(bytes), packing_);
     if (!found) {
       ++damaged_;
       return;
@@ -225,7 +226,8 @@ class Collector {
 
   const ByteFile& file_;
   Recording* recording_;
-  std::map<std::uint32_t, std::string> topic_of_;
+  std::map<std::uint32_t, BagConnection> connections_;
+  RosPacking packing_ = RosPacking::kRos1;          // of the message at hand
   std::string image_, imu_, wheels_, camera_info_;  // topics; empty: none
   std::string calibration_;
   bool compressed_ = false, wheels_are_odometry_ = false;
@@ -265,7 +267,7 @@ Recording read_bag(const fs::path& path, const BagChoice& choice) {
   const ByteFile file(path);
   Recording recording;
   Collector collector(file, topics_of(file), choice, &recording);
-  read_ros_bag(
+  read_bag_file(
       file, [&](const BagConnection& connection) { collector.connect(connection); },
       [&](const BagMessage& message) { collector.take(message); });
   if (recording.images.empty())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ROS 1 bags: one camera's images, and where there are any an IMU and wheel speeds. Pixels stay in the bag
-// until they are copied into the log.
+// ROS 1 bags and MCAP recordings of ROS 1 or 2: one camera's images, and where there are any an IMU and wheel
+// speeds. Pixels stay in the bag until they are copied into the log.
 #pragma once
 
 #include <filesystem>

@@ -138,7 +138,7 @@ void set_file(const RecordingImage& image, const std::string& bytes, image_t* me
   message->data.assign(bytes.begin(), bytes.end());
 }
 
-image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
+image_t to_message(const RecordingImage& image, const RecordingCamera& camera, const ImageSource& source) {
   image_t message{};
   message.utime = image.utime;
   message.sequence = image.sequence;
@@ -146,7 +146,7 @@ image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
   message.exposure_us = -1;
   message.gain = -1.0F;
   if (image.raw.encoding == RawEncoding::kNone) {
-    set_file(image, bytes_of(image), &message);
+    set_file(image, source ? source(image) : bytes_of(image), &message);
   } else {
     set_pixels(image, bytes_of(image), &message);
   }
@@ -160,7 +160,8 @@ image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
   return message;
 }
 
-void write_event(const Recording& recording, const Event& event, ipc::LogWriter* log) {
+void write_event(const Recording& recording, const Event& event, const ImageSource& source,
+                 ipc::LogWriter* log) {
   switch (event.kind) {
     case Kind::kImu:
       log->write_message(ipc::kImuChannel, event.utime, to_message(recording.imu[event.index]));
@@ -176,7 +177,7 @@ void write_event(const Recording& recording, const Event& event, ipc::LogWriter*
       const RecordingImage& image = recording.images[event.index];
       const std::string channel = ipc::kCameraChannelPrefix + std::to_string(image.camera);
       const RecordingCamera& camera = recording.cameras[static_cast<std::size_t>(image.camera)];
-      log->write_message(channel, event.utime, to_message(image, camera));
+      log->write_message(channel, event.utime, to_message(image, camera, source));
       return;
     }
   }
@@ -192,14 +193,15 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::filesystem::path& file) {
 
 }  // namespace
 
-void write_recording(const Recording& recording, const std::filesystem::path& log_file) {
+void write_recording(const Recording& recording, const std::filesystem::path& log_file,
+                     const ImageSource& source) {
   const std::vector<Event> events = events_in_order(recording);
   const std::unique_ptr<ipc::LogWriter> log = open_log(log_file);
   const std::int64_t first_utime = events.front().utime;  // every importer demands an image
   log->write_message(ipc::kCalibrationChannel, first_utime, calibration_message(recording, first_utime));
   Progress progress(log_file.filename().string(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) {
-    write_event(recording, events[i], log.get());
+    write_event(recording, events[i], source, log.get());
     if (!log->error().empty()) break;
     progress.advance(i + 1);
   }

@@ -70,9 +70,10 @@ class Reader {
 
  private:
   [[noreturn]] void refuse_kind() const {
-    const std::string wrong = ipc::wrong_kind(file_.path().string(), "a ROS 1 bag of version 2.0");
+    const std::string wrong = ipc::wrong_kind(file_.path().string(), "a ROS 1 bag or an MCAP recording");
     if (!wrong.empty() && wrong.find("a ROS 1 bag,") == std::string::npos) throw InputError(wrong);
-    throw InputError(file_.path().string() + ": expected a ROS 1 bag, which begins with '#ROSBAG V2.0'");
+    throw InputError(file_.path().string() +
+                     ": expected a ROS 1 bag (it begins with #ROSBAG V2.0) or an MCAP recording");
   }
 
   [[nodiscard]] Record record_at(std::uint64_t at, std::uint64_t end) const {

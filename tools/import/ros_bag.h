@@ -8,12 +8,14 @@
 #include <string>
 
 #include "tools/import/byte_file.h"
+#include "tools/import/ros_message.h"
 
 namespace farpoint::tools {
 
 struct BagConnection {
   std::uint32_t id = 0;
   std::string topic, type;  // "/camera/image_raw", "sensor_msgs/Image"
+  RosPacking packing = RosPacking::kRos1;
 };
 
 struct BagMessage {

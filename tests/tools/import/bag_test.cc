@@ -194,7 +194,7 @@ TEST_F(ImportBag, DamagedBytesNeverCrash) {
   const std::string whole = get(bag());
   std::mt19937 random(5);
   int read = 0;
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < 150; ++round) {
     std::string damaged = whole;
     for (int i = 0; i < 3; ++i)
       damaged[random() % (round % 2 == 0 ? 4000 : damaged.size())] = static_cast<char>(random());
@@ -206,7 +206,7 @@ TEST_F(ImportBag, DamagedBytesNeverCrash) {
       EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
     }
   }
-  EXPECT_GT(read, 50);
+  EXPECT_GT(read, 20);
 }
 
 TEST_F(ImportBag, TheProgramListsAndImports) {
