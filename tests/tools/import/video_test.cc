@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "ipc/image_codec.h"
 #include "ipc/log.h"
@@ -36,14 +37,22 @@ class ImportVideo : public testing::Test {
   // A program that notes its arguments, then does what the script says.
   void set(const std::string& name, const std::string& script) const {
     const fs::path file = root_ / ("bin/" + name);
-    put(file,
-        "#!/bin/sh\necho \"$@\" > '" + (root_ / (name + ".arguments")).string() + "'\n" + script + "\n");
+    std::string text = "#!/bin/sh\necho \"$@\" > '";
+    text.append((root_ / (name + ".arguments")).string()).append("'\n").append(script).append("\n");
+    put(file, text);
     fs::permissions(file, fs::perms::owner_all);
   }
   [[nodiscard]] ProgramResult import(const std::string& more = "") const {
-    return run_shell("PATH='" + (root_ / "bin").string() + "':$PATH; " + program() + " import video '" +
-                     video().string() + "' --camera '" + (root_ / "camera.yaml").string() + "' -o '" +
-                     (root_ / "run.lcm").string() + "' " + more);
+    const char* const path = std::getenv("PATH");
+    return import_with_path((root_ / "bin").string().append(":").append(path != nullptr ? path : ""), more);
+  }
+  [[nodiscard]] ProgramResult import_with_path(const std::string& path, const std::string& more) const {
+    std::string command = "PATH='";
+    command.append(path).append("' ").append(program());
+    command.append(" import video '").append(video().string()).append("' --camera '");
+    command.append((root_ / "camera.yaml").string()).append("' -o '");
+    command.append((root_ / "run.lcm").string()).append("' ").append(more);
+    return run_shell(command);
   }
   [[nodiscard]] std::vector<image_t> images() const {
     std::vector<image_t> images;
@@ -119,9 +128,7 @@ TEST_F(ImportVideo, SaysWhatIsWrongWithTheDecoder) {
 }
 
 TEST_F(ImportVideo, WithoutFfmpegItNamesThePackage) {
-  const ProgramResult result = run_shell(
-      "PATH='" + (root_ / "empty").string() + "' " + program() + " import video '" + video().string() +
-      "' --camera '" + (root_ / "camera.yaml").string() + "' -o '" + (root_ / "run.lcm").string() + "'");
+  const ProgramResult result = import_with_path((root_ / "empty").string(), "");
   EXPECT_EQ(result.status, 2);
   expect_all_in(result.err, {"ffprobe", "package ffmpeg"});
 }
@@ -135,11 +142,9 @@ TEST_F(ImportVideo, FilesThatAreNoVideosAreNamed) {
 
 TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
   if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
-  for (int i = 0; i < 5; ++i)
-    put(root_ / ("p" + std::to_string(i) + ".png"), make_image(".png", 64, 48, 10 * i));
-  const ProgramResult made =
-      run_shell("ffmpeg -v error -y -framerate 25 -i '" + (root_ / "p%d.png").string() +
-                "' -c:v ffv1 -pix_fmt gray -f matroska '" + video().string() + "'");
+  for (int i = 0; i < 5; ++i) put(root_ / (std::to_string(i) + ".png"), make_image(".png", 64, 48, 10 * i));
+  const ProgramResult made = run_shell("ffmpeg -v error -y -framerate 25 -i '" + (root_ / "%d.png").string() +
+                                       "' -c:v ffv1 -pix_fmt gray -f matroska '" + video().string() + "'");
   ASSERT_EQ(made.status, 0) << made.err;
   fs::remove_all(root_ / "bin");
   const ProgramResult done = import();
