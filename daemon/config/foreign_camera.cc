@@ -221,15 +221,19 @@ void set_kalibr_distortion(const YamlFile& yaml, const YAML::Node& node, Lens* l
 
 slam::SE3 kalibr_motion(const YamlFile& yaml, const YAML::Node& node, const std::string& key) {
   const YAML::Node rows = child(yaml, node, key);
-  YAML::Node flat;
+  std::vector<double> values;
   if (rows.IsSequence()) {
     for (const YAML::Node& row : rows) {
-      if (!row.IsSequence()) yaml.fail(row, "expected a 4x4 matrix, a list of 4 rows, for '" + key + "'");
-      for (const YAML::Node& value : row) flat.push_back(value);
+      const std::vector<double> numbers = yaml.numbers_in(row, key);
+      values.insert(values.end(), numbers.begin(), numbers.end());
     }
   }
-  if (flat.size() != 16) yaml.fail(rows, "expected a 4x4 matrix, a list of 4 rows, for '" + key + "'");
-  return yaml.rigid_motion(flat, key);
+  if (values.size() != 16) yaml.fail(rows, "expected a 4x4 matrix, a list of 4 rows, for '" + key + "'");
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix4d>(values.data()).transpose();
+  slam::SE3 motion;
+  if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1) || !to_rigid_motion(matrix.topRows<3>(), &motion))
+    yaml.fail(rows, "expected a rotation and a translation, last row 0 0 0 1, for '" + key + "'");
+  return motion;
 }
 
 void read_kalibr(const YamlFile& yaml, const std::string& wanted, ForeignCamera* camera) {

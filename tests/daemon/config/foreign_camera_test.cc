@@ -336,6 +336,11 @@ TEST(ForeignCalibration, WrongOnesAreNamedWithLineAndWhatWasExpected) {
                {"'wide'", "radtan"});
   expect_parts(complaint_of(chain + kalibr_camera("cam1", "pinhole", "4, 4, 3, 2", "none", ""), "cam1"),
                {"'T_cn_cnm1' is missing"});
+  std::string skewed = kMotion;
+  skewed.replace(skewed.find("1.0"), 3, "1.5");
+  expect_parts(
+      complaint_of(chain + kalibr_camera("cam1", "pinhole", "4, 4, 3, 2", "none", "", skewed), "cam1"),
+      {"calib.yaml:20:", "rotation and a translation"});
 }
 
 TEST(ForeignCalibration, AConversionThatIsNotGoodEnoughIsRefusedWithItsError) {
