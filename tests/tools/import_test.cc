@@ -25,8 +25,8 @@ struct Damage {
   std::function<void(const fs::path& root)> spoil;
   std::vector<std::string> complaint;
 };
-void PrintTo(const Damage& damage,
-             std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
+// NOLINTNEXTLINE(readability-identifier-naming): GoogleTest's name
+void PrintTo(const Damage& damage, std::ostream* out) {
   *out << damage.name;
 }
 

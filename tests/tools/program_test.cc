@@ -254,8 +254,8 @@ TEST(Program, JsonIsValid) {
 struct RealRecording {
   std::string name, arguments, truth, exported_with;
 };
-void PrintTo(const RealRecording& r,
-             std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
+// NOLINTNEXTLINE(readability-identifier-naming): GoogleTest's name
+void PrintTo(const RealRecording& r, std::ostream* out) {
   *out << r.name;
 }
 

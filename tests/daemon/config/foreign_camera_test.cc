@@ -340,7 +340,7 @@ TEST(ForeignCalibration, WrongOnesAreNamedWithLineAndWhatWasExpected) {
   skewed.replace(skewed.find("1.0"), 3, "1.5");
   expect_parts(
       complaint_of(chain + kalibr_camera("cam1", "pinhole", "4, 4, 3, 2", "none", "", skewed), "cam1"),
-      {"calib.yaml:20:", "rotation and a translation"});
+      {"calib.yaml:18:", "rotation and a translation"});
 }
 
 TEST(ForeignCalibration, AConversionThatIsNotGoodEnoughIsRefusedWithItsError) {
