@@ -16,13 +16,13 @@
 
 namespace farpoint::tools {
 
-ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const std::string& package) {
+ChildProcess::ChildProcess(std::vector<std::string> arguments, const std::string& package)
+    : error_fd_(memfd_create("standard error", MFD_CLOEXEC)) {
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   std::array<int, 2> pipe_fds{};
-  error_fd_ = memfd_create("standard error", MFD_CLOEXEC);
   if (error_fd_ < 0 || pipe2(pipe_fds.data(), O_CLOEXEC) != 0) {
     const std::string why = std::strerror(errno);
     if (error_fd_ >= 0) close(error_fd_);

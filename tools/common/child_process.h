@@ -15,7 +15,7 @@ class ChildProcess {
  public:
   // Starts arguments[0], looked up in PATH; its standard input is empty. Throws InputError where it is not
   // installed, naming `package`.
-  ChildProcess(const std::vector<std::string>& arguments, const std::string& package);
+  ChildProcess(std::vector<std::string> arguments, const std::string& package);
   // Ends it where it still runs.
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
