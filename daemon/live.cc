@@ -65,8 +65,17 @@ calibration_t calibration_of_cameras(const CameraConfig& camera) {
     throw ConfigError(
         "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
   }
-  if (camera.has_second()) return read_stereo_calibration(camera.calibration, camera.second_calibration);
-  return calibration_of(read_camera_file(camera.calibration), "camera");
+  std::vector<std::string> notices;
+  calibration_t calibration;
+  if (camera.has_second()) {
+    calibration = read_stereo_calibration(camera.calibration, camera.second_calibration, &notices);
+  } else {
+    const CameraFile file = read_camera_file(camera.calibration);
+    for (const std::string& notice : file.notices) notices.push_back(camera.calibration + ": " + notice);
+    calibration = calibration_of(file, "camera");
+  }
+  for (const std::string& notice : notices) spdlog::warn("{}", notice);
+  return calibration;
 }
 
 calibration_t read_calibration(const Config& config) {

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "ipc/file_kind.h"
+
 namespace farpoint::ipc {
 namespace {
 
@@ -37,6 +39,11 @@ int open_log(const std::string& path) {
   if (fstat(fd, &info) == 0 && S_ISDIR(info.st_mode)) {
     close(fd);
     throw std::runtime_error("cannot read log " + path + ": is a folder, an LCM log was expected");
+  }
+  const std::string wrong = wrong_kind(fd, path, "an LCM log");
+  if (!wrong.empty()) {
+    close(fd);
+    throw std::runtime_error(wrong);
   }
   return fd;
 }

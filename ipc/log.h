@@ -40,7 +40,7 @@ struct LogDamage {
 class LogReader {
  public:
   // "-" is standard input. A length above `most_data_bytes` counts as damage. Throws std::runtime_error
-  // naming a file that cannot be opened.
+  // naming a file that cannot be opened, or whose first bytes are those of another kind of file.
   explicit LogReader(const std::string& path, std::size_t most_data_bytes = kMaxDataBytes);
   ~LogReader();
   LogReader(const LogReader&) = delete;

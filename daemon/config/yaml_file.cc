@@ -17,7 +17,9 @@ namespace {
   throw InputError(ipc::printable(file.string()) + ": longer than 1 MiB, expected a short YAML file");
 }
 
-std::string read_file(const std::filesystem::path& file) {
+}  // namespace
+
+std::string read_short_file(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored))
     throw InputError(file.string() + ": expected a file, found a folder");
@@ -32,9 +34,7 @@ std::string read_file(const std::filesystem::path& file) {
   return content;
 }
 
-}  // namespace
-
-YamlFile::YamlFile(std::filesystem::path file) : YamlFile(file, read_file(file)) {}
+YamlFile::YamlFile(const std::filesystem::path& file) : YamlFile(file, read_short_file(file)) {}
 
 YamlFile::YamlFile(std::filesystem::path file, const std::string& content) : path_(std::move(file)) {
   if (content.size() > kMaxYamlBytes) refuse_length(path_);
@@ -64,7 +64,7 @@ std::string YamlFile::text(const std::string& key) const {
   return node.Scalar();
 }
 
-double YamlFile::finite_number(const YAML::Node& node, const std::string& name) const {
+double YamlFile::number_in(const YAML::Node& node, const std::string& name) const {
   double value = 0.0;
   const bool is_number = node.IsScalar() && YAML::convert<double>::decode(node, value);
   if (!is_number || !std::isfinite(value)) {
@@ -75,7 +75,7 @@ double YamlFile::finite_number(const YAML::Node& node, const std::string& name) 
 }
 
 double YamlFile::number(const std::string& key) const {
-  return finite_number(require(key), key);
+  return number_in(require(key), key);
 }
 
 double YamlFile::number_or(const std::string& key, double fallback) const {
@@ -95,7 +95,7 @@ std::vector<double> YamlFile::numbers(const std::string& key, const std::vector<
   const YAML::Node node = require(key);
   std::vector<double> values;
   if (node.IsSequence()) {
-    for (const YAML::Node& item : node) values.push_back(finite_number(item, key));
+    for (const YAML::Node& item : node) values.push_back(number_in(item, key));
   }
   if (!node.IsSequence() || std::find(lengths.begin(), lengths.end(), values.size()) == lengths.end()) {
     std::string wanted;
@@ -107,12 +107,19 @@ std::vector<double> YamlFile::numbers(const std::string& key, const std::vector<
   return values;
 }
 
+std::vector<double> YamlFile::numbers_in(const YAML::Node& node, const std::string& name) const {
+  if (!node.IsSequence()) fail(node, "expected a list of numbers for '" + name + "'");
+  std::vector<double> values;
+  for (const YAML::Node& item : node) values.push_back(number_in(item, name));
+  return values;
+}
+
 slam::SE3 YamlFile::rigid_motion(const YAML::Node& list, const std::string& name) const {
   if (!list.IsDefined() || !list.IsSequence() || list.size() != 16) {
     fail(list.IsDefined() ? list : root_, "expected 16 numbers (a 4x4 matrix by rows) for '" + name + "'");
   }
   Eigen::Matrix4d matrix;
-  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = finite_number(list[static_cast<std::size_t>(i)], name);
+  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = number_in(list[static_cast<std::size_t>(i)], name);
   slam::SE3 motion;
   if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1) || !to_rigid_motion(matrix.topRows<3>(), &motion)) {
     fail(list, "expected a rigid motion for '" + name +

@@ -21,7 +21,7 @@ class YamlFile {
  public:
   // Throws InputError if the file cannot be read, is longer than kMaxYamlBytes, is no YAML, or its top is no
   // map. Every error is one line.
-  explicit YamlFile(std::filesystem::path file);
+  explicit YamlFile(const std::filesystem::path& file);
   // Reads a file's content; `file` names it in errors.
   YamlFile(std::filesystem::path file, const std::string& content);
 
@@ -38,6 +38,9 @@ class YamlFile {
   // A list of finite numbers, of one of the given lengths.
   [[nodiscard]] std::vector<double> numbers(const std::string& key,
                                             const std::vector<std::size_t>& lengths) const;
+  // A node as one finite number, and as a list of them of any length; `name` is for the error.
+  [[nodiscard]] double number_in(const YAML::Node& node, const std::string& name) const;
+  [[nodiscard]] std::vector<double> numbers_in(const YAML::Node& node, const std::string& name) const;
   // Reads 16 numbers by rows into a rigid motion; `name` is for the error.
   [[nodiscard]] slam::SE3 rigid_motion(const YAML::Node& list, const std::string& name) const;
   // Fails for a key that is none of these.
@@ -46,11 +49,13 @@ class YamlFile {
   [[noreturn]] void fail(const YAML::Node& node, const std::string& message) const;
 
  private:
-  [[nodiscard]] double finite_number(const YAML::Node& node, const std::string& name) const;
-
   std::filesystem::path path_;
   YAML::Node root_;
 };
+
+// The content of a file, at most one byte more than kMaxYamlBytes of it. Throws InputError if it cannot be
+// read.
+[[nodiscard]] std::string read_short_file(const std::filesystem::path& file);
 
 // Returns the nearest rigid motion of a 3x3 or 3x4 matrix by rows; false if it differs by more than
 // `tolerance`.

@@ -21,6 +21,8 @@ std::span<const Target> targets() {
       {"control", run_control, seeds_of_control, 512},
       {"evaluate", run_evaluate, seeds_of_run, 16384},
       {"report", run_report, seeds_of_run, 16384},
+      {"bag", run_bag, seeds_of_bag, 4096},
+      {"stamps", run_stamps, seeds_of_stamps, 512},
   };
   return all;
 }

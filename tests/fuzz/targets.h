@@ -48,6 +48,8 @@ void run_can(ByteView input);
 void run_control(ByteView input);
 void run_evaluate(ByteView input);
 void run_report(ByteView input);
+void run_bag(ByteView input);
+void run_stamps(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_log();
 [[nodiscard]] std::vector<Bytes> seeds_of_message();
 [[nodiscard]] std::vector<Bytes> seeds_of_image();
@@ -58,5 +60,7 @@ void run_report(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_can();
 [[nodiscard]] std::vector<Bytes> seeds_of_control();
 [[nodiscard]] std::vector<Bytes> seeds_of_run();
+[[nodiscard]] std::vector<Bytes> seeds_of_bag();
+[[nodiscard]] std::vector<Bytes> seeds_of_stamps();
 
 }  // namespace farpoint::fuzz

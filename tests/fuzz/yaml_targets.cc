@@ -52,8 +52,10 @@ void expect_one_line(Function&& function) {
   }
 }
 
-void check_camera(const std::string& text) {
-  const daemon::CameraFile camera = daemon::parse_camera_file(text, "camera.yaml");
+void check_camera(const std::string& text, const std::string& name) {
+  const daemon::CameraFile camera = daemon::parse_camera_file(text, "camera.yaml", name);
+  for (const std::string& notice : camera.notices)
+    require(ipc::is_printable_line(notice), "a notice is one line");
   const calibration_t calibration = daemon::calibration_of(camera, "camera");
   const slam::Rig rig = daemon::make_rig(calibration, 0);
   const slam::Camera& model = rig.cameras.front().camera;
@@ -73,7 +75,8 @@ void run_config(ByteView input) {
 }
 
 void run_camera(ByteView input) {
-  expect_one_line([&] { check_camera(text_of(input)); });
+  expect_one_line([&] { check_camera(text_of(input), ""); });
+  expect_one_line([&] { check_camera(text_of(input), "cam1"); });
 }
 
 void run_world(ByteView input) {
@@ -96,7 +99,22 @@ std::vector<Bytes> seeds_of_camera() {
       bytes_of(
           "model: kannala-brandt\nwidth_px: 64\nheight_px: 48\nfx_px: 30\nfy_px: 30\ncx_px: 32\ncy_px: 24\n"
           "distortion: [0.1, 0, 0, 0]\nT_body_camera: [0,0,1,0, -1,0,0,0, 0,-1,0,0, 0,0,0,1]\n"
-          "rate_hz: 30\nrow_time_s: 1e-5\n")};
+          "rate_hz: 30\nrow_time_s: 1e-5\n"),
+      // ROS, Kalibr and OpenCV, in this order.
+      bytes_of(
+          "image_width: 64\nimage_height: 48\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+          "  data: [50, 0, 31, 0, 51, 23, 0, 0, 1]\ndistortion_model: rational_polynomial\n"
+          "distortion_coefficients:\n  rows: 1\n  cols: 8\n"
+          "  data: [0.47, -2.4, 0.0005, -0.0002, 1.4, 0.35, -2.3, 1.3]\nmount: {z_m: 1, pitch_deg: 5}\n"),
+      bytes_of("cam0:\n  camera_model: ds\n  distortion_coeffs: []\n  distortion_model: none\n"
+               "  intrinsics: [-0.2, 0.57, 15, 15, 31, 23]\n  resolution: [64, 48]\ncam1:\n"
+               "  camera_model: omni\n  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.11]\n  - [0.0, 1.0, 0.0, 0.02]\n"
+               "  - [0.0, 0.0, 1.0, 0.003]\n  - [0.0, 0.0, 0.0, 1.0]\n"),
+      bytes_of("%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\nfisheye_model: 1\n"
+               "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+               "   data: [ 5.0e+01, 0., 3.1e+01, 0., 5.1e+01, 2.3e+01, 0., 0., 1. ]\n"
+               "distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n"
+               "   data: [ 0.01, 0.02, 0.003, 0.004 ]\n")};
 }
 
 std::vector<Bytes> seeds_of_world() {

@@ -19,29 +19,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The message of the InputError that `action` must throw.
-std::string complaint_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& e) {
-    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos) << "more than one line";
-    return e.what();
-  }
-  ADD_FAILURE() << "no InputError";
-  return "";
-}
-
-void expect_all_in(const std::string& message, const std::vector<std::string>& parts) {
-  for (const std::string& part : parts)
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-}
-
 // One way to spoil a recording, and what the complaint must name.
 struct Damage {
   std::string name;
   std::function<void(const fs::path& root)> spoil;
   std::vector<std::string> complaint;
 };
+// NOLINTNEXTLINE(readability-identifier-naming): GoogleTest's name
 void PrintTo(const Damage& damage, std::ostream* out) {
   *out << damage.name;
 }

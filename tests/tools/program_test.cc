@@ -31,7 +31,8 @@ void expect_misuse(const std::string& arguments, const std::string& part) {
 TEST(Program, HelpTeaches) {
   for (const char* arguments :
        {"--help", "import --help", "import kitti --help", "import euroc --help", "import tum --help",
-        "export --help", "evaluate --help", "bench --help", "ctl --help", "top --help"}) {
+        "import images --help", "import bag --help", "import video --help", "export --help",
+        "evaluate --help", "bench --help", "ctl --help", "top --help"}) {
     const ProgramResult result = run_farpoint_program(arguments);
     EXPECT_EQ(result.status, 0) << arguments;
     EXPECT_EQ(result.err, "") << arguments;
@@ -47,10 +48,13 @@ TEST(Program, WrongUseIsStatusTwoAndOneLine) {
   const std::string tum = quoted(folder / "t.tum"), root = quoted(folder.path());
   expect_misuse("", "no command");
   expect_misuse("improt", "unknown command 'improt', expected one of: import");
-  expect_misuse("import", "subcommand");
+  expect_misuse("import", "no import, expected one of: kitti, euroc, tum, images, bag, video");
+  expect_misuse("import ros " + root,
+                "unknown import 'ros', expected one of: kitti, euroc, tum, images, bag, video");
   expect_misuse("import kitti " + root + " -o " + quoted(folder / "x.lcm"), "SEQUENCE");
   expect_misuse("import kitti " + root + " 07", "--output");
-  expect_misuse("import kitti " + root + " 08 -o " + quoted(folder / "x.lcm"), "sequences/08");
+  expect_misuse("import kitti " + root + " 08 -o " + quoted(folder / "x.lcm"),
+                "sequences/08: no such folder, expected one of 07");
   expect_misuse("import kitti " + root + " 07 -o " + quoted(folder / "nowhere/x.lcm"), "does not exist");
   expect_misuse("import tum " + root + " -o " + quoted(folder / "x.lcm"), "--camera");
   expect_misuse("evaluate " + tum, "--truth");
@@ -63,6 +67,41 @@ TEST(Program, WrongUseIsStatusTwoAndOneLine) {
   expect_misuse("export " + tum + " --truth", "LCM log");
   expect_misuse("export " + tum, "--truth or --trajectory");
   EXPECT_FALSE(fs::exists(folder / "x.lcm"));
+}
+
+// Files as Python's own writers make them.
+TEST(Program, FilesOfAWrongKindAreNamedForWhatTheyAre) {
+  const ScratchFolder folder;
+  const std::string script =
+      "import bz2, gzip, lzma, os, sqlite3, zipfile\n"
+      "os.chdir(r'" +
+      folder.path().string() +
+      "')\n"
+      "zipfile.ZipFile('a.zip', 'w').writestr('x', 'y')\n"
+      "gzip.open('a.gz', 'wb').write(b'x')\n"
+      "bz2.open('a.bz2', 'wb').write(b'x')\n"
+      "lzma.open('a.xz', 'wb').write(b'x')\n"
+      "d = sqlite3.connect('a.db3'); d.execute('create table t(x)'); d.commit()\n";
+  put(folder / "make.py", script);
+  ASSERT_EQ(run_shell(std::string(kPython) + " " + quoted(folder / "make.py")).status, 0);
+  put(folder / "a.bag", "#ROSBAG V2.0\nrest");
+  put(folder / "a.mp4", std::string("\0\0\0\x20", 4) + "ftypisom");
+  put(folder / "a.jpg", make_image(".jpg", 64, 48, 0));
+  put(folder / "a.png", make_image(".png", 64, 48, 0));
+  put(folder / "camera.yaml", "model: pinhole-radtan\n");
+  const std::vector<std::pair<std::string, std::string>> kinds = {
+      {"a.zip", "a ZIP archive"}, {"a.gz", "a gzip file"},     {"a.bz2", "a bzip2 file"},
+      {"a.xz", "an xz file"},     {"a.db3", "an SQLite"},      {"a.bag", "a ROS 1 bag"},
+      {"a.mp4", "an MP4 or MOV"}, {"a.jpg", "a JPEG picture"}, {"a.png", "a PNG picture"}};
+  for (const auto& [name, kind] : kinds) {
+    const std::string file = quoted(folder / name), part = name + ": " + kind;
+    expect_misuse("import kitti " + file + " 00 -o x.lcm", part);
+    expect_misuse("import images " + file + " --rate 1 --camera x -o x.lcm", part);
+    expect_misuse("import images " + quoted(folder.path()) + " --rate 1 --camera " + file + " -o x.lcm",
+                  part);
+    expect_misuse("export " + file + " --truth", part);
+    expect_misuse("evaluate " + file + " --truth " + file, part);
+  }
 }
 
 TEST(Program, ImportsExportsAndEvaluates) {
@@ -215,6 +254,7 @@ TEST(Program, JsonIsValid) {
 struct RealRecording {
   std::string name, arguments, truth, exported_with;
 };
+// NOLINTNEXTLINE(readability-identifier-naming): GoogleTest's name
 void PrintTo(const RealRecording& r, std::ostream* out) {
   *out << r.name;
 }

@@ -13,6 +13,7 @@
 #include "ipc/image_encoder.h"
 #include "slam/geometry/se3.h"
 #include "tests/support/paths.h"
+#include "tools/common/errors.h"
 
 namespace farpoint::tools {
 
@@ -55,6 +56,22 @@ std::string make_image(const std::string& extension, int width_px, int height_px
   return {bytes.begin(), bytes.end()};
 }
 
+std::string complaint_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const InputError& e) {
+    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos) << "more than one line";
+    return e.what();
+  }
+  ADD_FAILURE() << "no InputError";
+  return "";
+}
+
+void expect_all_in(const std::string& message, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
+}
+
 ProgramResult run_shell(const std::string& command) {
   const ScratchFolder scratch;
   const std::string out = (scratch / "out").string(), err = (scratch / "err").string();
@@ -62,8 +79,12 @@ ProgramResult run_shell(const std::string& command) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, get(out), get(err)};
 }
 
+std::string program() {
+  return test::binary_dir() + "/bin/farpoint";
+}
+
 ProgramResult run_farpoint_program(const std::string& arguments) {
-  return run_shell(test::binary_dir() + "/bin/farpoint " + arguments);
+  return run_shell(program() + " " + arguments);
 }
 
 void make_kitti(const fs::path& root) {

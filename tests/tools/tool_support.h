@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <functional>
 #include <random>
 #include <string>
 #include <vector>
@@ -34,12 +35,18 @@ void put(const std::filesystem::path& file, const std::string& content);
 void replace_in(const std::filesystem::path& file, const std::string& from, const std::string& to);
 [[nodiscard]] std::string make_image(const std::string& extension, int width_px, int height_px, int shade);
 
+// The message of the InputError that `action` must throw: one line.
+[[nodiscard]] std::string complaint_of(const std::function<void()>& action);
+void expect_all_in(const std::string& message, const std::vector<std::string>& parts);
+
 struct ProgramResult {
   int status = -1;
   std::string out, err;
 };
 // Runs a shell command line; run_farpoint_program puts the built farpoint before it.
 [[nodiscard]] ProgramResult run_shell(const std::string& command);
+// Path of the built farpoint.
+[[nodiscard]] std::string program();
 [[nodiscard]] ProgramResult run_farpoint_program(const std::string& arguments);
 
 // Small recordings of each layout: 5 frames of 64x48 pixels, stereo where the layout has it.

@@ -24,17 +24,26 @@ int report_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   return report(std::string(error.what()) + " (see farpoint --help)", kExitMisused);
 }
 
-// CLI11 would only say that a command is missing. Empty where the first word is a command or an option.
-std::string unknown_command(const CLI::App& app, int argc, const char* const* argv) {
-  const std::string word = argc > 1 ? argv[1] : "";
+// CLI11 would only say that a command is missing. Empty where the word is a command or an option. `kind` is
+// what the words are, "command" or "import".
+std::string unknown_command(const CLI::App& app, const std::string& word, const std::string& kind) {
   if (word.starts_with('-')) return {};
   std::string known;
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
     if (command->get_name() == word) return {};
     known += (known.empty() ? "" : ", ") + command->get_name();
   }
-  return (word.empty() ? "no command" : "unknown command '" + word + "'") +
-         std::string(", expected one of: ") + known + " (see farpoint --help)";
+  return (word.empty() ? "no " + kind : "unknown " + kind + " '" + word + "'") +
+         ", expected one of: " + known + " (see " + (kind == "command" ? "farpoint" : "farpoint " + kind) +
+         " --help)";
+}
+
+// The same for the first word, and for the layout behind 'import'.
+std::string unknown_words(const CLI::App& app, int argc, const char* const* argv) {
+  const std::string first = argc > 1 ? argv[1] : "", second = argc > 2 ? argv[2] : "";
+  std::string unknown = unknown_command(app, first, "command");
+  if (!unknown.empty() || first != "import") return unknown;
+  return unknown_command(*app.get_subcommand("import"), second, "import");
 }
 
 }  // namespace
@@ -63,7 +72,7 @@ int run_farpoint(int argc, const char* const* argv) {
   add_spy_command(&app, &action);
   add_report_command(&app, &action);
   add_simulate_command(&app, &action);
-  const std::string unknown = unknown_command(app, argc, argv);
+  const std::string unknown = unknown_words(app, argc, argv);
   if (!unknown.empty()) return report(unknown, kExitMisused);
   try {
     app.parse(argc, argv);

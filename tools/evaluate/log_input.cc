@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "ipc/channels.h"
+#include "ipc/file_kind.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 
@@ -210,6 +211,8 @@ bool is_lcm_log(const std::filesystem::path& file) {
   if (!stream || std::filesystem::is_directory(file)) {
     throw InputError(file.string() + ": cannot be read, expected an LCM log or a TUM trajectory file");
   }
+  const std::string wrong = ipc::wrong_kind(file.string(), "an LCM log or a TUM trajectory file");
+  if (!wrong.empty()) throw InputError(wrong);
   unsigned char head[4] = {};
   stream.read(reinterpret_cast<char*>(head), sizeof head);
   const std::uint32_t word = static_cast<std::uint32_t>(head[0]) << 24 |

@@ -11,7 +11,6 @@
 
 namespace farpoint::tools {
 
-using daemon::to_rigid_motion;
 using daemon::YamlFile;
 namespace {
 
@@ -148,6 +147,7 @@ void read_truth(const fs::path& file, Recording* recording) {
 }
 
 fs::path find_mav0(const fs::path& root) {
+  require_folder(root, "mav0, an EuRoC recording");
   if (fs::is_directory(root / "mav0" / "cam0")) return root / "mav0";
   if (fs::is_directory(root / "cam0")) return root;
   throw InputError(root.string() +

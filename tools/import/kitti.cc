@@ -171,12 +171,30 @@ void read_gps(const fs::path& file, Recording* recording) {
   }
 }
 
+// Names of the sequences that exist, for an error.
+std::string sequences_of(const fs::path& root) {
+  constexpr std::size_t kMostShown = 30;
+  std::vector<std::string> names;
+  if (fs::is_directory(root / "sequences")) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(root / "sequences"))
+      if (entry.is_directory()) names.push_back(entry.path().filename().string());
+  }
+  if (names.empty()) return "DIR/sequences/SEQUENCE";
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMostShown); ++i)
+    text += (i == 0 ? "" : ", ") + names[i];
+  return text +
+         (names.size() > kMostShown ? " and " + std::to_string(names.size() - kMostShown) + " more" : "");
+}
+
 }  // namespace
 
 Recording read_kitti(const fs::path& root, const std::string& sequence) {
   const fs::path folder = root / "sequences" / sequence;
+  require_folder(root, "'sequences', a KITTI recording");
   if (!fs::is_directory(folder)) {
-    throw InputError(folder.string() + ": no such folder, expected DIR/sequences/SEQUENCE");
+    throw InputError(folder.string() + ": no such folder, expected one of " + sequences_of(root));
   }
   if (!fs::is_directory(folder / "image_0"))
     throw InputError((folder / "image_0").string() + ": no such folder");

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <span>
 
+#include "daemon/config/camera_file.h"
+#include "ipc/file_kind.h"
 #include "ipc/image_codec.h"
+#include "ipc/log.h"
 #include "slam/geometry/rig.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
@@ -32,6 +35,61 @@ double median_rate_hz(const Recording& recording, int camera) {
 
 }  // namespace
 
+std::size_t bytes_a_pixel(RawEncoding encoding) {
+  switch (encoding) {
+    case RawEncoding::kRgb8:
+    case RawEncoding::kBgr8:
+      return 3;
+    case RawEncoding::kRgba8:
+    case RawEncoding::kBgra8:
+      return 4;
+    case RawEncoding::kUyvy8:
+    case RawEncoding::kYuyv8:
+      return 2;
+    case RawEncoding::kNone:
+    case RawEncoding::kGrey8:
+      break;
+  }
+  return 1;
+}
+
+void require_folder(const std::filesystem::path& folder, const std::string& wanted) {
+  if (std::filesystem::is_directory(folder)) return;
+  if (!std::filesystem::exists(folder))
+    throw InputError(folder.string() + ": no such folder, expected one that holds " + wanted);
+  const std::string wrong = ipc::wrong_kind(folder.string(), "a folder that holds " + wanted);
+  throw InputError(!wrong.empty() ? wrong
+                                  : folder.string() + ": is a file, expected a folder that holds " + wanted);
+}
+
+void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording) {
+  add_camera(daemon::read_camera_file(camera_file), camera_file.string(), name, recording);
+}
+
+void add_camera(const daemon::CameraFile& content, const std::string& origin, const std::string& name,
+                Recording* recording) {
+  RecordingCamera camera;
+  camera.name = name;
+  camera.parameters = content.parameters;
+  camera.T_body_camera = content.T_body_camera.value_or(forward_looking_T_body_camera());
+  camera.rate_hz = content.rate_hz;
+  camera.row_time_s = content.row_time_s;
+  if (content.T_body_camera) recording->body_name = "body";
+  for (const std::string& notice : content.notices) recording->notices.push_back(origin + ": " + notice);
+  recording->cameras.push_back(std::move(camera));
+}
+
+std::string read_image_file(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kMostBytes = ipc::LogReader::kMaxDataBytes - 1024;  // the message's other fields
+  std::error_code absent;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, absent);
+  if (!absent && bytes > kMostBytes) {
+    throw InputError(file.string() + ": " + std::to_string(bytes >> 20) +
+                     " MiB, expected an image file of less than 64 MiB");
+  }
+  return read_file(file);
+}
+
 ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file) {
   const std::span data(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   const std::optional<ipc::ImageInfo> info = ipc::probe_image(data);
@@ -50,7 +108,7 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
     const int index = static_cast<int>(c);
     if (camera.parameters.width_px == 0) {
       const std::filesystem::path& file = first_image_of(*recording, index).file;
-      const ipc::ImageInfo info = probe_image_file(read_file(file), file);
+      const ipc::ImageInfo info = probe_image_file(read_image_file(file), file);
       camera.parameters.width_px = info.width_px;
       camera.parameters.height_px = info.height_px;
     }
@@ -82,6 +140,7 @@ void keep_part(std::int64_t first, std::int64_t frames, const std::string& recor
     return sample.utime < from - kMargin_us || sample.utime > to + kMargin_us;
   };
   std::erase_if(recording->imu, outside);
+  std::erase_if(recording->wheels, outside);
   std::erase_if(recording->truth, outside);
 }
 

@@ -13,6 +13,10 @@
 #include "slam/geometry/camera.h"
 #include "slam/geometry/se3.h"
 
+namespace farpoint::daemon {
+struct CameraFile;
+}
+
 namespace farpoint::tools {
 
 struct RecordingCamera {
@@ -23,17 +27,34 @@ struct RecordingCamera {
   double row_time_s = 0.0;  // rolling shutter: one row to the next; 0 global; negative unknown
 };
 
+enum class RawEncoding : std::uint8_t { kNone, kGrey8, kRgb8, kBgr8, kRgba8, kBgra8, kUyvy8, kYuyv8 };
+[[nodiscard]] std::size_t bytes_a_pixel(RawEncoding encoding);
+
+// Pixels without a file format around them.
+struct RawImage {
+  RawEncoding encoding = RawEncoding::kNone;  // kNone: PNG or JPEG
+  int width_px = 0, height_px = 0;
+  std::size_t row_bytes = 0;
+};
+
 struct RecordingImage {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;  // the same for images taken together
   int camera = 0;
   std::filesystem::path file;
+  std::uint64_t offset = 0, bytes = 0;  // of the image in `file`; no bytes: all of it
+  RawImage raw{};
 };
 
 struct RecordingImu {
   std::int64_t utime = 0;
   Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();  // specific force
+};
+
+struct RecordingWheels {
+  std::int64_t utime = 0;
+  double speed_mps = 0.0, yaw_rate_radps = 0.0;
 };
 
 struct ImuCalibration {
@@ -54,16 +75,31 @@ struct Recording {
   std::string body_name;
   std::vector<RecordingCamera> cameras;
   std::optional<ImuCalibration> imu_calibration;
-  std::vector<RecordingImage> images;  // ascending in time, camera 0 first where they are taken together
-  std::vector<RecordingImu> imu;       // ascending in time
-  std::vector<RecordingTruth> truth;   // ascending in time
+  std::vector<RecordingImage> images;   // ascending in time, camera 0 first where they are taken together
+  std::vector<RecordingImu> imu;        // ascending in time
+  std::vector<RecordingWheels> wheels;  // ascending in time
+  std::vector<RecordingTruth> truth;    // ascending in time
   bool truth_has_orientation = true;
-  std::size_t missing_images = 0;  // listed, but without a file, or on one side of a stereo pair only
+  std::vector<std::string> notices;  // what a person should know, a line each
+  std::size_t missing_images = 0;    // listed, but without a file, or on one side of a stereo pair only
 };
 
 // Rotation of a camera that looks along the body's x axis, upright: camera z = body x, camera x = -body y.
 [[nodiscard]] slam::SE3 forward_looking_T_body_camera();
 
+// Throws InputError unless `folder` is one; `wanted` is what it should hold. Files of other recorders are
+// named.
+void require_folder(const std::filesystem::path& folder, const std::string& wanted);
+
+// Adds the camera of a camera file, and the body where the file names one. Without a body the camera looks
+// along the body's x axis, upright. Throws InputError naming the file.
+void add_camera(const std::filesystem::path& camera_file, const std::string& name, Recording* recording);
+// The same from what was read; `origin` names it in notices.
+void add_camera(const daemon::CameraFile& content, const std::string& origin, const std::string& name,
+                Recording* recording);
+
+// The bytes of an image file. Throws InputError for one that a log would not hold.
+[[nodiscard]] std::string read_image_file(const std::filesystem::path& file);
 // Reads format and size from the header of an image file. Throws InputError naming `file`.
 [[nodiscard]] ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file);
 

@@ -10,13 +10,13 @@
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
-#include "tools/common/text_file.h"
+#include "tools/import/byte_file.h"
 
 namespace farpoint::tools {
 namespace {
 
 // Order of messages of one time: what happened up to a frame comes before it.
-enum class Kind : int { kImu = 0, kTruth = 1, kImage = 2 };
+enum class Kind : int { kImu = 0, kWheels = 1, kTruth = 2, kImage = 3 };
 
 struct Event {
   std::int64_t utime;
@@ -28,6 +28,8 @@ std::vector<Event> events_in_order(const Recording& recording) {
   std::vector<Event> events;
   for (std::size_t i = 0; i < recording.imu.size(); ++i)
     events.push_back({recording.imu[i].utime, Kind::kImu, i});
+  for (std::size_t i = 0; i < recording.wheels.size(); ++i)
+    events.push_back({recording.wheels[i].utime, Kind::kWheels, i});
   for (std::size_t i = 0; i < recording.truth.size(); ++i) {
     events.push_back({recording.truth[i].utime, Kind::kTruth, i});
   }
@@ -81,32 +83,91 @@ ground_truth_t to_message(const RecordingTruth& truth, bool has_orientation) {
   return message;
 }
 
-image_t to_message(const RecordingImage& image, const RecordingCamera& camera) {
-  const std::string bytes = read_file(image.file);
-  const ipc::ImageInfo info = probe_image_file(bytes, image.file);
-  if (info.width_px != camera.parameters.width_px || info.height_px != camera.parameters.height_px) {
-    throw InputError(image.file.string() + ": expected " + std::to_string(camera.parameters.width_px) + "x" +
-                     std::to_string(camera.parameters.height_px) + " pixels as of camera " + camera.name +
-                     ", found " + std::to_string(info.width_px) + "x" + std::to_string(info.height_px));
+wheels_t to_message(const RecordingWheels& sample) {
+  wheels_t message{};
+  message.utime = sample.utime;
+  message.speed = sample.speed_mps;
+  message.speed_sigma = -1.0;
+  message.yaw_rate = sample.yaw_rate_radps;
+  message.steering_angle = std::numeric_limits<double>::quiet_NaN();
+  return message;
+}
+
+std::string bytes_of(const RecordingImage& image) {
+  return image.bytes == 0 ? read_image_file(image.file)
+                          : ByteFile(image.file).read(image.offset, image.bytes);
+}
+
+// Where the image is, for errors.
+std::filesystem::path name_of(const RecordingImage& image) {
+  if (image.bytes == 0) return image.file;
+  return image.file.string() + ": byte " + std::to_string(image.offset);
+}
+
+// A row of colour or luma samples as grey. ITU-R BT.601, as JPEG has it.
+void to_grey(const RawImage& raw, const std::uint8_t* from, std::uint8_t* to) {
+  const std::size_t step = bytes_a_pixel(raw.encoding);
+  const bool colour = step >= 3;
+  const bool red_first = raw.encoding == RawEncoding::kRgb8 || raw.encoding == RawEncoding::kRgba8;
+  const std::size_t luma = raw.encoding == RawEncoding::kUyvy8 ? 1 : 0;
+  for (int x = 0; x < raw.width_px; ++x, from += step) {
+    const unsigned red = colour ? from[red_first ? 0 : 2] : 0, blue = colour ? from[red_first ? 2 : 0] : 0;
+    to[x] = colour ? static_cast<std::uint8_t>((299 * red + 587 * from[1] + 114 * blue + 500) / 1000)
+                   : from[luma];
   }
+}
+
+void set_pixels(const RecordingImage& image, const std::string& bytes, image_t* message) {
+  const RawImage& raw = image.raw;
+  message->width = raw.width_px;
+  message->height = raw.height_px;
+  message->row_stride = raw.width_px;
+  message->pixel_format = image_t::PIXEL_FORMAT_GREY;
+  const auto width = static_cast<std::size_t>(raw.width_px), height = static_cast<std::size_t>(raw.height_px);
+  message->data.resize(width * height);
+  const auto* const from = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  for (std::size_t y = 0; y < height; ++y)
+    to_grey(raw, from + y * raw.row_bytes, message->data.data() + y * width);
+}
+
+void set_file(const RecordingImage& image, const std::string& bytes, image_t* message) {
+  const ipc::ImageInfo info = probe_image_file(bytes, name_of(image));
+  message->width = info.width_px;
+  message->height = info.height_px;
+  message->pixel_format = info.pixel_format;
+  message->data.assign(bytes.begin(), bytes.end());
+}
+
+image_t to_message(const RecordingImage& image, const RecordingCamera& camera, const ImageSource& source) {
   image_t message{};
   message.utime = image.utime;
   message.sequence = image.sequence;
   message.camera = image.camera;
   message.exposure_us = -1;
   message.gain = -1.0F;
-  message.width = info.width_px;
-  message.height = info.height_px;
-  message.pixel_format = info.pixel_format;
-  message.size = static_cast<std::int32_t>(bytes.size());
-  message.data.assign(bytes.begin(), bytes.end());
+  if (image.raw.encoding == RawEncoding::kNone) {
+    set_file(image, source ? source(image) : bytes_of(image), &message);
+  } else {
+    set_pixels(image, bytes_of(image), &message);
+  }
+  if (message.width != camera.parameters.width_px || message.height != camera.parameters.height_px) {
+    throw InputError(name_of(image).string() + ": expected " + std::to_string(camera.parameters.width_px) +
+                     "x" + std::to_string(camera.parameters.height_px) + " pixels as of camera " +
+                     camera.name + ", found " + std::to_string(message.width) + "x" +
+                     std::to_string(message.height));
+  }
+  message.size = static_cast<std::int32_t>(message.data.size());
   return message;
 }
 
-void write_event(const Recording& recording, const Event& event, ipc::LogWriter* log) {
+void write_event(const Recording& recording, const Event& event, const ImageSource& source,
+                 ipc::LogWriter* log) {
   switch (event.kind) {
     case Kind::kImu:
       log->write_message(ipc::kImuChannel, event.utime, to_message(recording.imu[event.index]));
+      return;
+    case Kind::kWheels:
+      log->write_message(ipc::kWheelsChannel, event.utime, to_message(recording.wheels[event.index]));
       return;
     case Kind::kTruth:
       log->write_message(ipc::kGroundTruthChannel, event.utime,
@@ -116,7 +177,7 @@ void write_event(const Recording& recording, const Event& event, ipc::LogWriter*
       const RecordingImage& image = recording.images[event.index];
       const std::string channel = ipc::kCameraChannelPrefix + std::to_string(image.camera);
       const RecordingCamera& camera = recording.cameras[static_cast<std::size_t>(image.camera)];
-      log->write_message(channel, event.utime, to_message(image, camera));
+      log->write_message(channel, event.utime, to_message(image, camera, source));
       return;
     }
   }
@@ -132,14 +193,15 @@ std::unique_ptr<ipc::LogWriter> open_log(const std::filesystem::path& file) {
 
 }  // namespace
 
-void write_recording(const Recording& recording, const std::filesystem::path& log_file) {
+void write_recording(const Recording& recording, const std::filesystem::path& log_file,
+                     const ImageSource& source) {
   const std::vector<Event> events = events_in_order(recording);
   const std::unique_ptr<ipc::LogWriter> log = open_log(log_file);
   const std::int64_t first_utime = events.front().utime;  // every importer demands an image
   log->write_message(ipc::kCalibrationChannel, first_utime, calibration_message(recording, first_utime));
   Progress progress(log_file.filename().string(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) {
-    write_event(recording, events[i], log.get());
+    write_event(recording, events[i], source, log.get());
     if (!log->error().empty()) break;
     progress.advance(i + 1);
   }

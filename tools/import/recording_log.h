@@ -4,13 +4,20 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <string>
 
 #include "tools/import/recording.h"
 
 namespace farpoint::tools {
 
-// Copies the image files' bytes unchanged. Replaces an existing log atomically. Throws InputError for an
-// image that cannot be read or differs in size from its camera, RunError if the log cannot be written.
-void write_recording(const Recording& recording, const std::filesystem::path& log_file);
+// The bytes of an image file, PNG or JPEG, for an image of a recording.
+using ImageSource = std::function<std::string(const RecordingImage&)>;
+
+// Copies the image files' bytes unchanged; with `source` each image's bytes are those that it returns, asked
+// for in order of time. Replaces an existing log atomically. Throws InputError for an image that cannot be
+// read or differs in size from its camera, RunError if the log cannot be written.
+void write_recording(const Recording& recording, const std::filesystem::path& log_file,
+                     const ImageSource& source = {});
 
 }  // namespace farpoint::tools

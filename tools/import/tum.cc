@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/import/tum.h"
 
-#include "daemon/config/camera_file.h"
 #include "tools/common/errors.h"
 #include "tools/common/text_file.h"
 #include "tools/trajectory/trajectory.h"
@@ -10,17 +9,6 @@ namespace farpoint::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-RecordingCamera make_camera(const fs::path& file) {
-  const daemon::CameraFile content = daemon::read_camera_file(file);
-  RecordingCamera camera;
-  camera.name = "rgb";
-  camera.parameters = content.parameters;
-  camera.T_body_camera = content.T_body_camera.value_or(forward_looking_T_body_camera());
-  camera.rate_hz = content.rate_hz;
-  camera.row_time_s = content.row_time_s;
-  return camera;
-}
 
 void read_images(const fs::path& folder, Recording* recording) {
   const FieldFile text(folder / "rgb.txt", kBlanks);
@@ -59,11 +47,9 @@ void read_truth(const fs::path& file, Recording* recording) {
 }  // namespace
 
 Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file) {
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string() + ": no such folder, expected one that holds rgb.txt");
+  require_folder(folder, "rgb.txt");
   Recording recording;
-  recording.cameras = {make_camera(camera_file)};
-  if (daemon::read_camera_file(camera_file).T_body_camera) recording.body_name = "body";
+  add_camera(camera_file, "rgb", &recording);
   read_images(folder, &recording);
   if (fs::exists(folder / "groundtruth.txt")) read_truth(folder / "groundtruth.txt", &recording);
   complete_cameras(camera_file, &recording);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <tuple>
 
 #include "daemon/config/camera_file.h"
 #include "daemon/config/config.h"
@@ -48,6 +49,21 @@ TEST(YamlFile, TheProgramsLastWordIsOneLineToo) {
   EXPECT_EQ(outcome.status, 2);
   EXPECT_EQ(outcome.err_lines(), 1) << outcome.err;
   EXPECT_EQ(outcome.err.find('\x1b'), std::string::npos) << outcome.err;
+}
+
+TEST(YamlFile, AReplayOfAnotherRecordersFileNamesIt) {
+  const test::Scratch scratch;
+  for (const auto& [name, bytes, kind] :
+       {std::tuple{"drive.mp4", std::string("\0\0\0\x20", 4) + "ftypisom", "an MP4 or MOV video"},
+        std::tuple{"drive.bag", std::string("#ROSBAG V2.0\n"), "a ROS 1 bag"}}) {
+    const std::string file = scratch.path(name);
+    std::ofstream(file) << bytes;
+    const test::Outcome outcome = test::run_daemon({"--replay", file, "--lockstep"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.err_lines(), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(file + ": " + kind + ", expected an LCM log"), std::string::npos)
+        << outcome.err;
+  }
 }
 
 TEST(YamlFile, ALongFileIsRefusedBeforeItIsParsed) {

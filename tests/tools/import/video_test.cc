@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Videos through programs with the names of ffprobe and ffmpeg, which say what the test tells them to; and
+// through the real ones where they are installed.
+#include "tools/import/video.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "ipc/image_codec.h"
+#include "ipc/log.h"
+#include "tests/tools/tool_support.h"
+
+namespace farpoint::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kCamera =
+    "model: pinhole-radtan\nwidth_px: 64\nheight_px: 48\nfx_px: 50\nfy_px: 51\ncx_px: 31\ncy_px: 23\n"
+    "distortion: []\n";
+
+class ImportVideo : public testing::Test {
+ protected:
+  ImportVideo() {
+    put(root_ / "camera.yaml", kCamera);
+    put(video(), std::string("\0\0\0\x20", 4) + "ftypisom");
+    set("ffprobe",
+        "printf 'width=64\\nheight=48\\n'; for t in 0.000000 0.040000 0.080000; do echo "
+        "best_effort_timestamp_time=$t; done");
+    // Frame i is all of the value 65 + i.
+    set("ffmpeg", "for c in A B C; do head -c 3072 /dev/zero | tr '\\0' $c; done");
+  }
+
+  [[nodiscard]] fs::path video() const { return root_ / "a drive.mp4"; }
+  // A program that notes its arguments, then does what the script says.
+  void set(const std::string& name, const std::string& script) const {
+    const fs::path file = root_ / ("bin/" + name);
+    std::string text = "#!/bin/sh\necho \"$@\" > '";
+    text.append((root_ / (name + ".arguments")).string()).append("'\n").append(script).append("\n");
+    put(file, text);
+    fs::permissions(file, fs::perms::owner_all);
+  }
+  [[nodiscard]] ProgramResult import(const std::string& more = "") const {
+    const char* const path = std::getenv("PATH");
+    return import_with_path((root_ / "bin").string().append(":").append(path != nullptr ? path : ""), more);
+  }
+  [[nodiscard]] ProgramResult import_with_path(const std::string& path, const std::string& more) const {
+    std::string command = "PATH='";
+    command.append(path).append("' ").append(program());
+    command.append(" import video '").append(video().string()).append("' --camera '");
+    command.append((root_ / "camera.yaml").string()).append("' -o '");
+    command.append((root_ / "run.lcm").string()).append("' ").append(more);
+    return run_shell(command);
+  }
+  [[nodiscard]] std::vector<image_t> images() const {
+    std::vector<image_t> images;
+    ipc::LogReader reader((root_ / "run.lcm").string());
+    for (ipc::LogEvent event; reader.next(&event);) {
+      image_t image{};
+      if (event.channel == "CAMERA_0" && ipc::decode(event.data, &image)) images.push_back(image);
+    }
+    return images;
+  }
+  void expect_refused(const std::vector<std::string>& parts, const std::string& more = "") const {
+    const ProgramResult result = import(more);
+    EXPECT_NE(result.status, 0);
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    expect_all_in(result.err, parts);
+    EXPECT_FALSE(fs::exists(root_ / "run.lcm"));
+  }
+
+  ScratchFolder root_;
+};
+
+TEST_F(ImportVideo, FramesAndTheirTimesComeFromTheTwoPrograms) {
+  const ProgramResult done = import();
+  ASSERT_EQ(done.status, 0) << done.err;
+  const std::vector<image_t> frames = images();
+  ASSERT_EQ(frames.size(), 3U);
+  ipc::ImageDecoder decoder;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(frames[i].utime, static_cast<std::int64_t>(40'000 * i));
+    EXPECT_EQ(frames[i].pixel_format, image_t::PIXEL_FORMAT_PNG);
+    ipc::GreyImage grey;
+    ASSERT_EQ(decoder.decode(frames[i], &grey), ipc::ImageStatus::kOk);
+    EXPECT_EQ(grey.pixels, std::vector<std::uint8_t>(64 * 48, static_cast<std::uint8_t>('A' + i)));
+  }
+  // The name is an address of a file, not an option or another protocol.
+  for (const char* name : {"ffprobe.arguments", "ffmpeg.arguments"})
+    EXPECT_NE(get(root_ / name).find("file:" + video().string()), std::string::npos) << get(root_ / name);
+}
+
+TEST_F(ImportVideo, APartSkipsTheFramesBeforeIt) {
+  ASSERT_EQ(import("--first 1 --frames 1 --rate 10").status, 0);
+  const std::vector<image_t> frames = images();
+  ASSERT_EQ(frames.size(), 1U);
+  EXPECT_EQ(frames[0].utime, 100'000) << "by --rate";
+  ipc::GreyImage grey;
+  ipc::ImageDecoder decoder;
+  ASSERT_EQ(decoder.decode(frames[0], &grey), ipc::ImageStatus::kOk);
+  EXPECT_EQ(grey.pixels[0], 'B');
+}
+
+TEST_F(ImportVideo, SaysWhatIsWrong) {
+  set("ffprobe", "echo 'moov atom not found' >&2; exit 1");
+  expect_refused({"a drive.mp4", "moov atom not found"});
+  set("ffprobe", "printf 'width=64\\nheight=48\\nbest_effort_timestamp_time=N/A\\n'");
+  expect_refused({"frame 0 has no time", "--rate"});
+  set("ffprobe",
+      "printf 'width=64\\nheight=48\\nbest_effort_timestamp_time=1\\nbest_effort_timestamp_time=1\\n'");
+  expect_refused({"frame 1 is not after", "--rate"});
+  set("ffprobe", "printf 'width=32\\nheight=48\\nbest_effort_timestamp_time=1\\n'");
+  expect_refused({"32x48", "expected 64x48", "camera.yaml"});
+  set("ffprobe", "printf 'width=2000000000\\nheight=2000000000\\nbest_effort_timestamp_time=1\\n'");
+  expect_refused({"2000000000x2000000000", "16384"});
+  set("ffprobe", "yes best_effort_timestamp_time=1");
+  expect_refused({"more than two million frames"});
+  expect_refused({"--rate"}, "--rate -3");
+}
+
+TEST_F(ImportVideo, SaysWhatIsWrongWithTheDecoder) {
+  set("ffmpeg", "head -c 4000 /dev/zero; echo 'Invalid data found' >&2; exit 1");
+  expect_refused({"a drive.mp4", "ends before frame 1", "Invalid data found"});
+  set("ffprobe", "exec nowhere-to-be-found");
+  expect_refused({"expected a video that ffprobe reads"});
+}
+
+TEST_F(ImportVideo, WithoutFfmpegItNamesThePackage) {
+  const ProgramResult result = import_with_path((root_ / "empty").string(), "");
+  EXPECT_EQ(result.status, 2);
+  expect_all_in(result.err, {"ffprobe", "package ffmpeg"});
+}
+
+TEST_F(ImportVideo, FilesThatAreNoVideosAreNamed) {
+  put(video(), "#ROSBAG V2.0\n");
+  expect_refused({"a ROS 1 bag", "expected a video", "import bag"});
+  fs::remove(video());
+  expect_refused({"no such file"});
+}
+
+TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
+  if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
+  for (int i = 0; i < 5; ++i) put(root_ / (std::to_string(i) + ".png"), make_image(".png", 64, 48, 10 * i));
+  const ProgramResult made = run_shell("ffmpeg -v error -y -framerate 25 -i '" + (root_ / "%d.png").string() +
+                                       "' -c:v ffv1 -pix_fmt gray -f matroska '" + video().string() + "'");
+  ASSERT_EQ(made.status, 0) << made.err;
+  fs::remove_all(root_ / "bin");
+  const ProgramResult done = import();
+  ASSERT_EQ(done.status, 0) << done.err;
+  const std::vector<image_t> frames = images();
+  ASSERT_EQ(frames.size(), 5U);
+  ipc::ImageDecoder decoder;
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(frames[i].utime, static_cast<std::int64_t>(40'000 * i));
+    ipc::GreyImage grey;
+    ASSERT_EQ(decoder.decode(frames[i], &grey), ipc::ImageStatus::kOk);
+    for (std::size_t k = 0; k < grey.pixels.size(); ++k)
+      ASSERT_EQ(grey.pixels[k], static_cast<std::uint8_t>(k % 64 + k / 64 + 10 * i)) << i << " " << k;
+  }
+}
+
+}  // namespace
+}  // namespace farpoint::tools

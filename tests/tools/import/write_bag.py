@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Writes a small ROS 1 bag (format 2.0, one chunk, with index) by the format's description, standard library only.
+
+usage: write_bag.py OUT.bag [--compression NAME] [--unindexed] [--no-info] [--encoding NAME] [--second-camera]
+
+Images /cam0/image_raw (64x48, 3 of them, 50 ms apart), /cam0/image_raw/compressed where --jpeg FILE is given, camera_info,
+/imu (10), /odom (4) and a topic of another type.
+"""
+
+import argparse
+import struct
+
+SECONDS = 1_600_000_000
+
+
+def record(header, data):
+    packed = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k.encode() + b"=" + v for k, v in header.items())
+    return struct.pack("<I", len(packed)) + packed + struct.pack("<I", len(data)) + data
+
+
+def text(value):
+    return struct.pack("<I", len(value)) + value.encode()
+
+
+def stamp(nanoseconds):
+    return struct.pack("<II", SECONDS + nanoseconds // 10**9, nanoseconds % 10**9)
+
+
+def header(sequence, nanoseconds, frame="cam0"):
+    return struct.pack("<I", sequence) + stamp(nanoseconds) + text(frame)
+
+
+def pixel(x, y, shade):
+    return (x + y + shade) % 256
+
+
+def image(sequence, nanoseconds, encoding):
+    rows = []
+    for y in range(48):
+        grey = [pixel(x, y, sequence) for x in range(64)]
+        row = {"mono8": bytes(grey),
+               "rgb8": bytes(v for g in grey for v in (g, 0, 0)),
+               "bgr8": bytes(v for g in grey for v in (g, 0, 0)),
+               "yuv422": bytes(v for g in grey for v in (128, g))}.get(encoding, bytes(grey))
+        rows.append(row + b"\xee" * 4)  # rows are padded
+    data = b"".join(rows)
+    return (header(sequence, nanoseconds) + struct.pack("<II", 48, 64) + text(encoding) + b"\0" +
+            struct.pack("<I", len(rows[0])) + struct.pack("<I", len(data)) + data)
+
+
+def camera_info():
+    numbers = [50.0, 0, 31, 0, 51, 23, 0, 0, 1]
+    return (header(0, 0) + struct.pack("<II", 48, 64) + text("plumb_bob") + struct.pack("<I", 5) +
+            struct.pack("<5d", -0.1, 0.01, 0, 0, 0) + struct.pack("<9d", *numbers) +
+            struct.pack("<9d", 1, 0, 0, 0, 1, 0, 0, 0, 1) + struct.pack("<12d", *numbers, 0, 0, 0) +
+            struct.pack("<II", 0, 0) + struct.pack("<IIIIB", 0, 0, 0, 0, 0))
+
+
+def imu(sequence, nanoseconds):
+    return (header(sequence, nanoseconds, "imu") + struct.pack("<4d", 0, 0, 0, 1) + struct.pack("<9d", *[0] * 9) +
+            struct.pack("<3d", 0.1, 0.2, sequence) + struct.pack("<9d", *[0] * 9) + struct.pack("<3d", 0, 0, 9.81) +
+            struct.pack("<9d", *[0] * 9))
+
+
+def odometry(sequence, nanoseconds):
+    return (header(sequence, nanoseconds, "odom") + text("base_link") + struct.pack("<7d", 1, 2, 3, 0, 0, 0, 1) +
+            struct.pack("<36d", *[0] * 36) + struct.pack("<6d", 1.5 + sequence, 0, 0, 0, 0, 0.25) +
+            struct.pack("<36d", *[0] * 36))
+
+
+def connection(number, topic, kind):
+    data = b"".join(struct.pack("<I", len(f)) + f for f in (
+        b"topic=" + topic.encode(), b"type=" + kind.encode(), b"md5sum=" + b"0" * 32,
+        b"message_definition=uint32 x\n"))
+    return record({"op": b"\x07", "conn": struct.pack("<I", number), "topic": topic.encode()}, data)
+
+
+def message(number, nanoseconds, data):
+    return record({"op": b"\x02", "conn": struct.pack("<I", number), "time": stamp(nanoseconds)}, data)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out")
+    parser.add_argument("--compression", default="none")
+    parser.add_argument("--encoding", default="mono8")
+    parser.add_argument("--unindexed", action="store_true")
+    parser.add_argument("--no-info", action="store_true")
+    parser.add_argument("--second-camera", action="store_true")
+    parser.add_argument("--jpeg")
+    options = parser.parse_args()
+
+    topics = [("/cam0/image_raw", "sensor_msgs/Image"), ("/imu", "sensor_msgs/Imu"), ("/odom", "nav_msgs/Odometry"),
+              ("/chatter", "std_msgs/String")]
+    if not options.no_info:
+        topics.append(("/cam0/camera_info", "sensor_msgs/CameraInfo"))
+    if options.jpeg:
+        topics[0] = ("/cam0/image_raw/compressed", "sensor_msgs/CompressedImage")
+    if options.second_camera:
+        topics.append(("/cam1/image_raw", "sensor_msgs/Image"))
+    number = {topic: i for i, (topic, _) in enumerate(topics)}
+    connections = b"".join(connection(i, topic, kind) for i, (topic, kind) in enumerate(topics))
+
+    chunk = connections
+    if not options.no_info:
+        chunk += message(number["/cam0/camera_info"], 0, camera_info())
+    chunk += message(number["/chatter"], 0, text("hello"))
+    for i in range(10):
+        chunk += message(number["/imu"], 10_000_000 * i + 5, imu(i, 10_000_000 * i))
+    for i in range(4):
+        chunk += message(number["/odom"], 30_000_000 * i + 5, odometry(i, 30_000_000 * i))
+    for i in range(3):
+        when = 50_000_000 * i
+        if options.jpeg:
+            with open(options.jpeg, "rb") as file:
+                content = file.read()
+            data = header(i, when) + text("jpeg") + struct.pack("<I", len(content)) + content
+        else:
+            data = image(i, when, options.encoding)
+        chunk += message(0, when + 1_000_000, data)
+    if options.second_camera:
+        chunk += message(number["/cam1/image_raw"], 0, image(0, 0, "mono8"))
+
+    body = record({"op": b"\x05", "compression": options.compression.encode(), "size": struct.pack("<I", len(chunk))},
+                  chunk)
+    if not options.unindexed:
+        body += record({"op": b"\x04", "ver": struct.pack("<I", 1), "conn": struct.pack("<I", 1),
+                        "count": struct.pack("<I", 1)}, stamp(0) + struct.pack("<I", 0))
+    bag_header = record({"op": b"\x03", "index_pos": struct.pack("<Q", 0), "conn_count": struct.pack("<I", 4),
+                         "chunk_count": struct.pack("<I", 1)}, b" " * 100)
+    end = b"" if options.unindexed else connections + record(
+        {"op": b"\x06", "ver": struct.pack("<I", 1), "chunk_pos": struct.pack("<Q", 0), "start_time": stamp(0),
+         "end_time": stamp(0), "count": struct.pack("<I", 0)}, b"")
+    with open(options.out, "wb") as file:
+        file.write(b"#ROSBAG V2.0\n" + bag_header + body + end)
+
+
+main()

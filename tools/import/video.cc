@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/import/video.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <vector>
+
+#include "ipc/file_kind.h"
+#include "ipc/image_codec.h"
+#include "ipc/image_encoder.h"
+#include "tools/common/child_process.h"
+#include "tools/common/errors.h"
+
+namespace farpoint::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxProbeBytes = std::size_t{64} << 20;  // some 2 million frames
+constexpr double kMaxRate_hz = 10'000.0, kMaxTime_s = 9e9;
+
+// As an address of a local file, whatever characters the name has: not as an option, a list or a network
+// stream.
+std::string address_of(const fs::path& file) {
+  return "file:" + fs::absolute(file).string();
+}
+
+struct Probe {
+  int width_px = 0, height_px = 0;
+  std::vector<double> times_s;  // NaN: unknown
+};
+
+void take_line(std::string_view line, Probe* probe) {
+  const std::size_t equals = line.find('=');
+  if (equals == std::string_view::npos) return;
+  const std::string_view key = line.substr(0, equals), text = line.substr(equals + 1);
+  const auto parse = [&](auto* value) {
+    return std::from_chars(text.data(), text.data() + text.size(), *value).ec == std::errc();
+  };
+  if (key == "width" && !parse(&probe->width_px)) probe->width_px = 0;
+  if (key == "height" && !parse(&probe->height_px)) probe->height_px = 0;
+  if (key != "best_effort_timestamp_time") return;
+  double time_s = 0.0;
+  probe->times_s.push_back(parse(&time_s) ? time_s : std::nan(""));
+}
+
+[[noreturn]] void refuse(const fs::path& file, const ChildProcess& child, const std::string& what) {
+  const std::string said = child.complaint();
+  throw InputError(file.string() + ": " + what + (said.empty() ? "" : " (" + said + ")"));
+}
+
+Probe probe_video(const fs::path& file) {
+  ChildProcess child(
+      {"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0", "-show_entries",
+       "stream=width,height:frame=best_effort_timestamp_time", "-of", "default=nw=1", address_of(file)},
+      "ffmpeg");
+  Probe probe;
+  std::string rest;
+  std::vector<char> buffer(1 << 16);
+  std::size_t total = 0;
+  for (std::size_t got = child.read(buffer); got > 0; got = child.read(buffer)) {
+    total += got;
+    if (total > kMaxProbeBytes) refuse(file, child, "more than two million frames, expected a shorter video");
+    rest.append(buffer.data(), got);
+    std::size_t begin = 0;
+    for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n', begin)) {
+      take_line(std::string_view(rest).substr(begin, end - begin), &probe);
+      begin = end + 1;
+    }
+    rest.erase(0, begin);
+  }
+  if (child.wait() != 0 || probe.times_s.empty()) refuse(file, child, "expected a video that ffprobe reads");
+  const auto pixels = std::int64_t{probe.width_px} * probe.height_px;
+  if (probe.width_px < 1 || probe.height_px < 1 || probe.width_px > ipc::kMaxImageSide_px ||
+      probe.height_px > ipc::kMaxImageSide_px || pixels > ipc::kMaxImagePixels)
+    refuse(file, child,
+           "frames of " + std::to_string(probe.width_px) + "x" + std::to_string(probe.height_px) +
+               " pixels, expected at most 16384 a side and 64 million");
+  return probe;
+}
+
+std::int64_t utime_of(const fs::path& file, const Probe& probe, std::size_t i, double rate_hz) {
+  if (rate_hz != 0.0) return std::llround(static_cast<double>(i) * 1e6 / rate_hz);
+  const double time_s = probe.times_s[i];
+  if (!(time_s >= 0.0 && time_s <= kMaxTime_s))
+    throw InputError(file.string() + ": frame " + std::to_string(i) + " has no time, expected --rate HZ");
+  return std::llround(time_s * 1e6);
+}
+
+void add_frames(const fs::path& file, const Probe& probe, double rate_hz, Recording* recording) {
+  std::int64_t last_utime = -1;
+  for (std::size_t i = 0; i < probe.times_s.size(); ++i) {
+    RecordingImage image;
+    image.utime = utime_of(file, probe, i, rate_hz);
+    if (image.utime <= last_utime)
+      throw InputError(file.string() + ": frame " + std::to_string(i) +
+                       " is not after the one before, expected --rate HZ");
+    last_utime = image.utime;
+    image.sequence = static_cast<std::int64_t>(i);
+    image.file = file;
+    recording->images.push_back(image);
+  }
+}
+
+void check_file(const fs::path& file) {
+  if (!fs::exists(file)) throw InputError(file.string() + ": no such file, expected a video");
+  if (fs::is_directory(file)) throw InputError(file.string() + ": is a folder, expected a video file");
+  const std::string wrong = ipc::wrong_kind(file.string(), "a video");
+  if (!wrong.empty() && wrong.find(" video, expected") == std::string::npos) throw InputError(wrong);
+}
+
+}  // namespace
+
+Recording read_video(const fs::path& file, const fs::path& camera_file, double rate_hz) {
+  if (rate_hz != 0.0 && !(rate_hz > 0.0 && rate_hz <= kMaxRate_hz))
+    throw InputError("--rate: expected frames a second, above 0 and at most 10000");
+  check_file(file);
+  Recording recording;
+  add_camera(camera_file, "camera", &recording);
+  const Probe probe = probe_video(file);
+  const slam::Camera::Parameters& camera = recording.cameras[0].parameters;
+  if (probe.width_px != camera.width_px || probe.height_px != camera.height_px) {
+    throw InputError(file.string() + ": frames of " + std::to_string(probe.width_px) + "x" +
+                     std::to_string(probe.height_px) + " pixels, expected " +
+                     std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px) + " as in " +
+                     camera_file.string());
+  }
+  add_frames(file, probe, rate_hz, &recording);
+  complete_cameras(camera_file, &recording);
+  return recording;
+}
+
+struct VideoFrames::Decoder {
+  Decoder(fs::path video, int width, int height)
+      : file(std::move(video)),
+        width_px(width),
+        height_px(height),
+        pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+        child({"ffmpeg", "-v", "error", "-nostdin", "-protocol_whitelist", "file,pipe", "-noautorotate", "-i",
+               address_of(file), "-map", "0:v:0", "-fps_mode", "passthrough", "-f", "rawvideo", "-pix_fmt",
+               "gray", "pipe:1"},
+              "ffmpeg") {}
+
+  fs::path file;
+  int width_px, height_px;
+  std::vector<std::uint8_t> pixels;
+  std::int64_t next = 0;  // number of the frame that comes next
+  ChildProcess child;
+};
+
+VideoFrames::VideoFrames(fs::path file, int width_px, int height_px)
+    : decoder_(std::make_unique<Decoder>(std::move(file), width_px, height_px)) {}
+
+VideoFrames::~VideoFrames() = default;
+
+std::string VideoFrames::frame(std::int64_t number) {
+  Decoder& d = *decoder_;
+  for (; d.next <= number; ++d.next) {
+    const std::span buffer(reinterpret_cast<char*>(d.pixels.data()), d.pixels.size());
+    if (d.child.read(buffer) == d.pixels.size()) continue;
+    (void)d.child.wait();
+    refuse(d.file, d.child,
+           "ends before frame " + std::to_string(d.next) + ", expected what ffprobe counted");
+  }
+  const std::vector<std::uint8_t> png = ipc::encode_png({d.width_px, d.height_px, d.pixels});
+  return {png.begin(), png.end()};
+}
+
+}  // namespace farpoint::tools

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Video files, decoded by ffmpeg as a child process: ffprobe names the frames' times, ffmpeg writes grey
+// frames into a pipe. Neither is linked.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "tools/import/recording.h"
+
+namespace farpoint::tools {
+
+// Times are the video's own, or frame i is at i / rate_hz where rate_hz is not 0. Frames are not turned,
+// whatever the file says of its orientation. Throws InputError, also where ffprobe is not installed.
+[[nodiscard]] Recording read_video(const std::filesystem::path& file,
+                                   const std::filesystem::path& camera_file, double rate_hz);
+
+// The frames of a video, one after another.
+class VideoFrames {
+ public:
+  VideoFrames(std::filesystem::path file, int width_px, int height_px);
+  ~VideoFrames();
+  VideoFrames(const VideoFrames&) = delete;
+  VideoFrames& operator=(const VideoFrames&) = delete;
+
+  // Frame `number` as a PNG file; earlier ones are skipped. Precondition: numbers rise. Throws InputError
+  // where the video has no such frame, with what ffmpeg said.
+  [[nodiscard]] std::string frame(std::int64_t number);
+
+ private:
+  struct Decoder;
+  std::unique_ptr<Decoder> decoder_;
+};
+
+}  // namespace farpoint::tools
