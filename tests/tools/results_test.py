@@ -7,6 +7,7 @@ usage: results_test.py SOURCE_FOLDER
 
 import contextlib
 import datetime
+import dataclasses
 import io
 import json
 import pathlib
@@ -213,6 +214,29 @@ class Age(unittest.TestCase):
     def test_an_uncommitted_change_counts(self):
         self.write("slam/a.cc", "2")
         self.assertIn("slam changed", self.age())
+
+    def test_of_a_configuration_only_the_named_sections_count(self):
+        text = "a:\n  # comment\n  x: 1\nb:\n  x: 1\nab:\n  x: 1\n"
+        names = ["a", "ab"]
+        same, other = store.sections_hash(text, names), store.sections_hash
+        self.assertEqual(same, other(text.replace("# comment", "# another"), names))
+        self.assertEqual(same, other(text.replace("b:\n  x: 1\nab", "b:\n  x: 2\nab"), names))
+        self.assertNotEqual(same, other(text.replace("a:\n  # comment\n  x: 1", "a:\n  # comment\n  x: 2"), names))
+        self.assertNotEqual(same, other(text.replace("ab:\n  x: 1", "ab:\n  x: 2"), names))
+
+    def test_another_section_of_the_configuration_leaves_it_new(self):
+        table = dataclasses.replace(self.table, inputs=("conf.yaml#a",))
+        self.write("conf.yaml", "a:\n  x: 1\nb:\n  x: 1\n")
+        self.commit()
+        self.result["made"]["inputs"] = store.input_hashes(table.inputs, root=self.root)
+        self.write("conf.yaml", "a:\n  x: 1\nb:\n  x: 2\n")
+        self.assertIsNone(store.age(table, self.result, root=self.root))
+        self.commit()
+        self.assertIsNone(store.age(table, self.result, root=self.root))
+        self.write("conf.yaml", "a:\n  x: 2\nb:\n  x: 2\n")
+        self.assertIn("conf.yaml changed", store.age(table, self.result, root=self.root))
+        self.commit()
+        self.assertIn("conf.yaml changed in 3 commits", store.age(table, self.result, root=self.root))
 
     def test_another_command_makes_it_old(self):
         self.result["made"]["commands"] = ["false"]
@@ -438,7 +462,10 @@ class Manifest(unittest.TestCase):
     def test_inputs_exist(self):
         for table in manifest.TABLES:
             for path in table.inputs:
-                self.assertTrue((ROOT / path).exists(), f"{table.name}: {path}")
+                file, _, names = path.partition("#")
+                self.assertTrue((ROOT / file).exists(), f"{table.name}: {path}")
+                sections = set(re.findall(r"^(\w+):", (ROOT / file).read_text(), re.MULTILINE)) if names else set()
+                self.assertLessEqual(set(names.split(",")) - {""}, sections, f"{table.name}: {path}")
 
     def test_every_command_exists(self):
         lists = "\n".join(path.read_text() for folder in ("tests", "daemon", "tools")

@@ -6,7 +6,8 @@ of its own; its last command prints JSON.
 
 from dataclasses import dataclass
 
-ESTIMATOR = ("slam", "config/farpoint.yaml")
+ESTIMATOR = ("slam", "config/farpoint.yaml#scale,pyramid,extractor,capacity,initialisation,tracking,keyframes,landmarks,"
+                     "mapping,calibration")
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ def world(name, size, duration_s):
 
 KITTI = "{bin}/farpoint import kitti {data}/kitti 03 -o run.lcm"
 EUROC = "{bin}/farpoint import euroc {data}/euroc/MH_01_part -o run.lcm"
-DAEMON = (*ESTIMATOR, "daemon")
+DAEMON = (*ESTIMATOR, "config/farpoint.yaml#realtime", "daemon")
 
 
 def live(label, importing, options):

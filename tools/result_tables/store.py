@@ -2,6 +2,7 @@
 """Results as JSON files of tests/results: one a table, with what they were made from."""
 
 import datetime
+import hashlib
 import json
 import os
 import pathlib
@@ -69,8 +70,28 @@ def machine(cpuinfo=pathlib.Path("/proc/cpuinfo")):
 
 
 def input_hashes(inputs, commit="HEAD", root=ROOT):
-    """Git's hash of each file or folder at the commit; None for one that was not there."""
-    return {path: git("rev-parse", "--verify", "--quiet", f"{commit}:{path}", root=root) for path in inputs}
+    """A hash of each input at the commit; None for one that was not there. An input is a file or folder, or sections of a
+    YAML file as in config/farpoint.yaml#tracking,mapping, of which comments do not count."""
+    return {path: input_hash(path, commit, root) for path in inputs}
+
+
+def input_hash(path, commit, root=ROOT):
+    file, _, names = path.partition("#")
+    if not names:
+        return git("rev-parse", "--verify", "--quiet", f"{commit}:{path}", root=root)
+    text = git("show", f"{commit}:{file}", root=root)
+    return None if text is None else sections_hash(text, names.split(","))
+
+
+def sections_hash(text, names):
+    kept, inside = [], False
+    for line in text.splitlines():
+        line = line.split("#")[0].rstrip()
+        if line and not line[0].isspace():
+            inside = line.partition(":")[0] in names
+        if line and inside:
+            kept.append(line)
+    return hashlib.sha1("\n".join(kept).encode()).hexdigest()
 
 
 def built_commit(programs):
@@ -93,8 +114,15 @@ def made(table, commit, seconds):
 def changed_inputs(table, result, root=ROOT):
     """Inputs of the table that are not those it was made from, uncommitted changes included."""
     before, now = result["made"]["inputs"], input_hashes(table.inputs, root=root)
-    return [path for path in table.inputs
-            if now[path] != before.get(path) or git("status", "--porcelain", "--", path, root=root)]
+    return [path for path in table.inputs if now[path] != before.get(path) or is_edited(path, now[path], root)]
+
+
+def is_edited(path, committed, root):
+    """Whether the input differs from the last commit."""
+    file, _, names = path.partition("#")
+    if not git("status", "--porcelain", "--", file, root=root):
+        return False
+    return not names or sections_hash((root / file).read_text(), names.split(",")) != committed
 
 
 def age(table, result, today=None, root=ROOT):
@@ -107,7 +135,8 @@ def age(table, result, today=None, root=ROOT):
     if git("rev-parse", "HEAD", root=root) is not None:
         changed = changed_inputs(table, result, root)
         if changed:
-            reasons.append(f"{', '.join(changed)} changed{commits_since(result['made'], changed, root)}")
+            files = list(dict.fromkeys(path.partition("#")[0] for path in changed))
+            reasons.append(f"{', '.join(files)} changed{commits_since(result['made'], files, root)}")
     if not reasons:
         return None
     head = result["made"]
