@@ -36,6 +36,7 @@ struct RecordConfig {
   int max_size_mb = 0;
   double max_minutes = 0;
   double min_free_share = 0;  // of the disk
+  int waiting_images = 60;    // of each camera, in memory
 };
 
 enum class CameraDriverChoice { kV4l2, kLibcamera, kFile, kLcm };

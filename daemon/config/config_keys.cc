@@ -94,6 +94,7 @@ std::vector<ConfigKey> make_keys() {
       integer("record.max_size_mb", "MB", 0, 100000000, FIELD(record.max_size_mb)),
       number("record.max_minutes", "min", 0, 1000000, FIELD(record.max_minutes)),
       number("record.min_free_share", "", 0, 0.9, FIELD(record.min_free_share)),
+      integer("record.waiting_images", "images", 2, 300, FIELD(record.waiting_images)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
       enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),

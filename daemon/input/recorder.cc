@@ -8,11 +8,12 @@
 
 namespace farpoint::daemon {
 
-Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration)
+Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration, int waiting_images)
     : name(ipc::kCameraChannelPrefix + std::to_string(camera)),
-      images(kWaiting, Image{{},
-                             std::vector<std::uint8_t>(
-                                 static_cast<std::size_t>(calibration.width * calibration.height), 0)}) {
+      images(static_cast<std::size_t>(waiting_images),
+             Image{{},
+                   std::vector<std::uint8_t>(static_cast<std::size_t>(calibration.width * calibration.height),
+                                             0)}) {
   message.camera = camera;
   message.width = message.row_stride = calibration.width;
   message.height = calibration.height;
@@ -23,7 +24,7 @@ Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration)
 Recorder::Recorder(const std::string& path, const RecordConfig& limits, const calibration_t& calibration)
     : recording_(path, limits, calibration) {
   for (const camera_calibration_t& camera : calibration.cameras)
-    channels_.emplace_back(static_cast<int>(channels_.size()), camera);
+    channels_.emplace_back(static_cast<int>(channels_.size()), camera, limits.waiting_images);
 }
 
 void Recorder::offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame) {

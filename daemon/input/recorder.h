@@ -46,14 +46,13 @@ class Recorder {
   [[nodiscard]] std::int64_t left_out() const { return left_out_.load(); }
 
  private:
-  static constexpr std::size_t kWaiting = 60;  // images of a camera: two seconds of an ordinary one
   struct Image {
     drivers::CameraFrame frame;
     std::vector<std::uint8_t> pixels;
   };
   // One ring a camera, since one thread pushes into a ring.
   struct Channel {
-    Channel(int camera, const camera_calibration_t& calibration);
+    Channel(int camera, const camera_calibration_t& calibration, int waiting_images);
     const std::string name;
     image_t message{};
     slam::SpscRing<Image> images;

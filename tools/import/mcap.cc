@@ -38,7 +38,7 @@ class Fields {
  private:
   std::string_view take(std::uint64_t size) {
     if (size > bytes_.size() - at_) file_.fail(offset_ + at_, "a record's field is longer than the record");
-    const std::string_view field = std::string_view(bytes_).substr(at_, size);
+    const std::string_view bytes{bytes_}, field = bytes.substr(at_, size);
     at_ += size;
     return field;
   }
@@ -86,7 +86,8 @@ class Reader {
     record.offset = at;
     record.kind = static_cast<std::uint8_t>(head[0]);
     record.data = at + kRecordHeadBytes;
-    record.data_bytes = little_endian(std::string_view(head).substr(1));
+    const std::string_view behind_kind{head.data() + 1, head.size() - 1};
+    record.data_bytes = little_endian(behind_kind);
     if (record.data_bytes > end - record.data)
       file_.fail(at, "a record of " + std::to_string(record.data_bytes) + " bytes, where " +
                          std::to_string(end - record.data) + " are left" + kRepair);
