@@ -172,6 +172,15 @@ TEST_F(RelocaliserTest, BoundsTheWorkOfAFrameAndSearchesEverythingInTurn) {
   // The whole view in one frame would be more.
   EXPECT_LT(most, 4 * slice);
 
+  // Where the landmarks seen last cost more than that alone, nothing else is searched.
+  for (std::size_t i = 0; i < large.points.size(); ++i) large.points[i].in_reference = i < 1100;
+  large_matcher.set_view(large.view());
+  const SceneFrame busy = elsewhere.look(SE3{}, last.utime + 2'000'000);
+  large_matcher.begin(*busy.frame);
+  EXPECT_FALSE(large_relocaliser.relocalise(*busy.frame, last).ok);
+  EXPECT_GT(large_relocaliser.work(), 1.5e6);
+  EXPECT_LT(large_relocaliser.work(), 2.5e6);
+
   // A turn of the camera that only the whole view shows is found within the turns.
   for (std::size_t i = 0; i < large.points.size(); ++i) {
     large.points[i].in_reference = i % 3 == 0;
