@@ -83,6 +83,9 @@ std::string wrong_kind(int fd, const std::string& file, const std::string& wante
 }
 
 std::string wrong_kind(const std::string& file, const std::string& wanted, bool with_advice) {
+  // A pipe whose reader closes it ends its writer: other files than regular ones are not opened.
+  struct stat info {};
+  if (stat(file.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return {};
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return {};
   std::string text = wrong_kind(fd, file, wanted, with_advice);

@@ -223,7 +223,9 @@ std::filesystem::path split_name(const std::filesystem::path& file, std::string*
   const std::string text = file.string();
   const std::size_t mark = text.rfind('#');
   std::error_code ignored;
-  if (mark == std::string::npos || std::filesystem::exists(file, ignored)) return file;
+  if (mark == std::string::npos || text.find('/', mark) != std::string::npos ||
+      std::filesystem::exists(file, ignored))
+    return file;
   *name = text.substr(mark + 1);
   return text.substr(0, mark);
 }

@@ -224,6 +224,9 @@ slam::SE3 kalibr_motion(const YamlFile& yaml, const YAML::Node& node, const std:
   std::vector<double> values;
   if (rows.IsSequence()) {
     for (const YAML::Node& row : rows) {
+      // Aliases make a short file long: no more is read than a matrix has.
+      if (values.size() >= 16 || row.size() > 4)
+        yaml.fail(row, "expected 4 rows of 4 numbers for '" + key + "'");
       const std::vector<double> numbers = yaml.numbers_in(row, key);
       values.insert(values.end(), numbers.begin(), numbers.end());
     }

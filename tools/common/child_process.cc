@@ -16,14 +16,23 @@
 
 namespace farpoint::tools {
 
+namespace {
+
+constexpr off_t kComplaintBytes = 64 << 10;
+
+}  // namespace
+
 ChildProcess::ChildProcess(std::vector<std::string> arguments, const std::string& package)
-    : error_fd_(memfd_create("standard error", MFD_CLOEXEC)) {
+    : error_fd_(memfd_create("standard error", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   std::array<int, 2> pipe_fds{};
-  if (error_fd_ < 0 || pipe2(pipe_fds.data(), O_CLOEXEC) != 0) {
+  // A sealed file does not grow: what the child says beyond that is lost.
+  if (error_fd_ < 0 || ftruncate(error_fd_, kComplaintBytes) != 0 ||
+      fcntl(error_fd_, F_ADD_SEALS, F_SEAL_GROW | F_SEAL_SHRINK) != 0 ||
+      pipe2(pipe_fds.data(), O_CLOEXEC) != 0) {
     const std::string why = std::strerror(errno);
     if (error_fd_ >= 0) close(error_fd_);
     throw RunError(arguments[0] + ": cannot be started (" + why + ")");
@@ -68,15 +77,15 @@ std::size_t ChildProcess::read(std::span<char> buffer) {
 int ChildProcess::wait() {
   if (pid_ <= 0) return -1;
   int status = 0;
-  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-  }
+  pid_t ended = waitpid(pid_, &status, 0);
+  while (ended < 0 && errno == EINTR) ended = waitpid(pid_, &status, 0);
   pid_ = -1;
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return ended > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 std::string ChildProcess::complaint() const {
   constexpr off_t kMostBytes = 4096;
-  const off_t size = lseek(error_fd_, 0, SEEK_END);
+  const off_t size = lseek(error_fd_, 0, SEEK_CUR);  // the child writes at the same offset
   const off_t begin = size > kMostBytes ? size - kMostBytes : 0;
   std::string text(static_cast<std::size_t>(size > 0 ? size - begin : 0), '\0');
   const ssize_t got = pread(error_fd_, text.data(), text.size(), begin);

@@ -251,6 +251,11 @@ void set_camera(const ByteFile& file, const BagChoice& choice, const Collector& 
   if (collector.calibration().empty())
     throw InputError(file.path().string() + ": no message on " + collector.camera_info() +
                      ", the calibration of " + collector.image() + "; expected --camera FILE");
+  // Its K and distortion are of the raw image.
+  if (collector.image().find("image_rect") != std::string::npos)
+    throw InputError(file.path().string() + ": " + collector.image() + ": rectified images, while " +
+                     collector.camera_info() +
+                     " describes raw ones; expected --camera FILE, or --image of raw ones");
   const std::string name = file.path().string() + ", " + collector.camera_info();
   add_camera(daemon::parse_camera_file(collector.calibration(), name), name, "camera", recording);
 }

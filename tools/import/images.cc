@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxRate_hz = 10'000.0;
+constexpr double kMinRate_hz = 1e-3, kMaxRate_hz = 10'000.0;
 constexpr std::uintmax_t kMaxStampFileBytes = std::uintmax_t{64} << 20;
 constexpr std::int64_t kMaxUtime = 9'000'000'000'000'000;  // as of FieldLine's times
 // Units are a factor of 1000 apart, as are these limits, so exactly one unit fits an interval.
@@ -106,6 +106,19 @@ std::int64_t utime_of(const Stamp& stamp, StampUnit unit) {
   return std::llround(value_us);
 }
 
+// Refuses stamps that are dates of 2001 to 2103 in another unit, in which their pace is possible.
+void refuse_other_date(const std::vector<Stamp>& stamps, double interval, StampUnit unit) {
+  constexpr double kFirstDate_s = 1e9, kLastDate_s = 4.2e9, kFastest_s = 1e-4, kSlowest_s = 3600.0;
+  for (const StampUnit other : kUnits) {
+    const double unit_s = seconds_of(other), interval_s = interval * unit_s;
+    const bool dates =
+        number_of(stamps.front()) * unit_s >= kFirstDate_s && number_of(stamps.back()) * unit_s < kLastDate_s;
+    if (other != unit && dates && interval_s >= kFastest_s && interval_s <= kSlowest_s)
+      throw InputError(stamps.front().where + ": dates in " + to_string(other) +
+                       ", while the pace is one in " + to_string(unit) + ", expected --unit");
+  }
+}
+
 StampUnit unit_of(const std::vector<Stamp>& stamps) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
@@ -118,7 +131,9 @@ StampUnit unit_of(const std::vector<Stamp>& stamps) {
   const double interval = intervals.empty() ? 0.0 : percentile(std::move(intervals), 50.0);
   for (const StampUnit unit : kUnits) {
     const double interval_s = interval * seconds_of(unit);
-    if (interval_s >= kLeastInterval_s && interval_s < kMostInterval_s) return unit;
+    if (interval_s < kLeastInterval_s || interval_s >= kMostInterval_s) continue;
+    refuse_other_date(stamps, interval, unit);
+    return unit;
   }
   if (interval != 0.0) {
     throw InputError(stamps.front().where +
@@ -195,7 +210,7 @@ void add_at_stamps(const std::vector<Stamp>& stamps, StampUnit unit, Recording* 
     if (utime <= last_utime)
       refuse_stamp(stamp, std::string("a stamp after the one before (read as ") + to_string(unit) + ")");
     last_utime = utime;
-    if (fs::exists(stamp.picture)) {
+    if (fs::is_regular_file(stamp.picture)) {
       recording->images.push_back({utime, number, 0, stamp.picture});
     } else {
       ++recording->missing_images;
@@ -207,8 +222,8 @@ void add_at_stamps(const std::vector<Stamp>& stamps, StampUnit unit, Recording* 
 void check_times(const PictureTimes& times) {
   const bool has_rate = times.rate_hz != 0.0, has_stamps = !times.stamps.empty();
   if (has_rate == has_stamps) throw InputError("import images: expected one of --rate HZ and --times FILE");
-  if (has_rate && !(times.rate_hz > 0.0 && times.rate_hz <= kMaxRate_hz))
-    throw InputError("--rate: expected pictures a second, above 0 and at most 10000");
+  if (has_rate && !(times.rate_hz >= kMinRate_hz && times.rate_hz <= kMaxRate_hz))
+    throw InputError("--rate: expected pictures a second, 0.001 to 10000");
 }
 
 }  // namespace
@@ -270,6 +285,9 @@ Recording read_images(const fs::path& folder, const fs::path& camera_file, const
     const StampUnit unit = times.unit == StampUnit::kAuto ? unit_of(stamps) : times.unit;
     if (unit_used != nullptr) *unit_used = unit;
     add_at_stamps(stamps, unit, &recording);
+    if (stamps.size() < pictures.size())
+      recording.notices.push_back(times.stamps + ": names " + std::to_string(stamps.size()) + " of " +
+                                  std::to_string(pictures.size()) + " pictures, the others were left out");
   }
   if (recording.images.empty()) {
     throw InputError(times.stamps + ": none of the pictures that it names exists in " + folder.string());

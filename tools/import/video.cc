@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxProbeBytes = std::size_t{64} << 20;  // some 2 million frames
-constexpr double kMaxRate_hz = 10'000.0, kMaxTime_s = 9e9;
+constexpr double kMinRate_hz = 1e-3, kMaxRate_hz = 10'000.0, kMaxTime_s = 9e9;
 
 // As an address of a local file, whatever characters the name has: not as an option, a list or a network
 // stream.
@@ -50,10 +50,15 @@ void take_line(std::string_view line, Probe* probe) {
   throw InputError(file.string() + ": " + what + (said.empty() ? "" : " (" + said + ")"));
 }
 
+// Containers of one file. Others, such as playlists, name further files.
+constexpr const char* kFormats =
+    "mov,matroska,webm,avi,mpegts,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,flv,asf,ogg,ivf,obu,yuv4mpegpipe";
+
 Probe probe_video(const fs::path& file) {
   ChildProcess child(
-      {"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0", "-show_entries",
-       "stream=width,height:frame=best_effort_timestamp_time", "-of", "default=nw=1", address_of(file)},
+      {"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-format_whitelist", kFormats,
+       "-select_streams", "v:0", "-show_entries", "stream=width,height:frame=best_effort_timestamp_time",
+       "-of", "default=nw=1", address_of(file)},
       "ffmpeg");
   Probe probe;
   std::string rest;
@@ -84,7 +89,9 @@ std::int64_t utime_of(const fs::path& file, const Probe& probe, std::size_t i, d
   if (rate_hz != 0.0) return std::llround(static_cast<double>(i) * 1e6 / rate_hz);
   const double time_s = probe.times_s[i];
   if (!(time_s >= 0.0 && time_s <= kMaxTime_s))
-    throw InputError(file.string() + ": frame " + std::to_string(i) + " has no time, expected --rate HZ");
+    throw InputError(file.string() + ": frame " + std::to_string(i) +
+                     (std::isnan(time_s) ? " has no time" : " is at " + std::to_string(time_s) + " s") +
+                     ", expected --rate HZ");
   return std::llround(time_s * 1e6);
 }
 
@@ -113,8 +120,8 @@ void check_file(const fs::path& file) {
 }  // namespace
 
 Recording read_video(const fs::path& file, const fs::path& camera_file, double rate_hz) {
-  if (rate_hz != 0.0 && !(rate_hz > 0.0 && rate_hz <= kMaxRate_hz))
-    throw InputError("--rate: expected frames a second, above 0 and at most 10000");
+  if (rate_hz != 0.0 && !(rate_hz >= kMinRate_hz && rate_hz <= kMaxRate_hz))
+    throw InputError("--rate: expected frames a second, 0.001 to 10000");
   check_file(file);
   Recording recording;
   add_camera(camera_file, "camera", &recording);
@@ -137,9 +144,26 @@ struct VideoFrames::Decoder {
         width_px(width),
         height_px(height),
         pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
-        child({"ffmpeg", "-v", "error", "-nostdin", "-protocol_whitelist", "file,pipe", "-noautorotate", "-i",
-               address_of(file), "-map", "0:v:0", "-fps_mode", "passthrough", "-f", "rawvideo", "-pix_fmt",
-               "gray", "pipe:1"},
+        child({"ffmpeg",
+               "-v",
+               "error",
+               "-nostdin",
+               "-protocol_whitelist",
+               "file,pipe",
+               "-format_whitelist",
+               kFormats,
+               "-noautorotate",
+               "-i",
+               address_of(file),
+               "-map",
+               "0:v:0",
+               "-fps_mode",
+               "passthrough",
+               "-f",
+               "rawvideo",
+               "-pix_fmt",
+               "gray",
+               "pipe:1"},
               "ffmpeg") {}
 
   fs::path file;

@@ -214,6 +214,18 @@ TEST(KalibrChain, AStereoPairIsReadFromOneChain) {
   EXPECT_TRUE(notices.empty());
 }
 
+// Aliases make a short text long: 2 MB here, 40 GB with a thousand times as many.
+TEST(KalibrChain, AMotionOfTooManyNumbersIsRefusedBeforeTheyAreRead) {
+  std::string row = "[1.0", motion = "  T_cn_cnm1:\n  - &a ";
+  for (int i = 0; i < 2000; ++i) row += ", 1.0";
+  motion += row + "]\n";
+  for (int i = 0; i < 2000; ++i) motion += "  - *a\n";
+  const std::string chain =
+      kalibr_camera("cam0", "pinhole", "460, 459, 370, 250", "radtan", "0, 0, 0, 0") +
+      kalibr_camera("cam1", "pinhole", "460, 459, 370, 250", "radtan", "0, 0, 0, 0", motion);
+  expect_parts(complaint_of(chain, "cam1"), {"calib.yaml:", "4 rows of 4 numbers", "T_cn_cnm1"});
+}
+
 TEST(KalibrChain, DoubleSphereIsConvertedWithinItsStatedError) {
   const double xi = -0.27, alpha = 0.57;
   const CameraFile c = parse(kalibr_camera("cam0", "ds", "-0.27, 0.57, 150, 151, 370, 240", "none", ""));

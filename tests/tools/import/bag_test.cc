@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include <algorithm>
 
 #include "ipc/log.h"
@@ -57,7 +59,9 @@ TEST_F(ImportBag, ReadsImagesCalibrationImuAndWheels) {
   ASSERT_EQ(r.cameras.size(), 1U);
   EXPECT_EQ(r.cameras[0].parameters.fx_px, 50.0);
   EXPECT_EQ(r.cameras[0].parameters.cy_px, 23.0);
-  EXPECT_EQ(r.cameras[0].parameters.distortion[0], -0.1);
+  EXPECT_EQ(r.cameras[0].parameters.fy_px, 51.0);
+  EXPECT_EQ(r.cameras[0].parameters.cx_px, 31.0);
+  EXPECT_EQ(r.cameras[0].parameters.distortion, (std::array<double, 5>{-0.1, 0.01, 0.002, -0.003, 0.0004}));
   EXPECT_NEAR(r.cameras[0].rate_hz, 20.0, 1e-6);
   ASSERT_EQ(r.images.size(), 3U);
   EXPECT_EQ(r.images[1].utime, kStart + 50'000) << "the header's time, not that of the reception";
@@ -182,11 +186,24 @@ TEST_F(ImportBag, LengthsBeyondTheFileAreRefusedBeforeMemoryIsTaken) {
 TEST_F(ImportBag, ACutOffBagIsRefusedWhereverItEnds) {
   write();
   const std::string whole = get(bag());
-  const std::size_t end = whole.find("compression=none") + 200;
-  for (std::size_t size = 14; size < end; size += 7) {
+  const std::size_t chunk = whole.find("compression=none");
+  for (std::size_t size = 14; size < chunk + 200; size += 7) {
     put(bag(), whole.substr(0, size));
     (void)complaint();
   }
+  // Behind the first image too: nothing of a cut chunk is taken for all there is.
+  const std::size_t last = whole.rfind("chunk_pos=");
+  ASSERT_NE(last, std::string::npos);
+  for (std::size_t size = chunk + 200; size < chunk + 9000; size += 97) {
+    put(bag(), whole.substr(0, size));
+    expect_all_in(complaint(), {"byte ", "rosbag reindex"});
+  }
+}
+
+// camera_info has the raw image's lens: with rectified pixels its distortion were applied twice.
+TEST_F(ImportBag, RectifiedImagesNeedACameraFile) {
+  write("--image-name /cam0/image_rect");
+  expect_all_in(complaint(), {"/cam0/image_rect", "rectified", "/cam0/camera_info", "--camera FILE"});
 }
 
 TEST_F(ImportBag, DamagedBytesNeverCrash) {

@@ -114,6 +114,22 @@ TEST_F(ImportImages, UnderstandsStampsInEveryUnit) {
   EXPECT_EQ(read_stamps("0\n1\n2\n", StampUnit::kMilliseconds).images.back().utime, 2'000);
 }
 
+// Seconds of 2014, five apart: by the pace alone they were milliseconds of January 1970.
+TEST_F(ImportImages, RefusesAPaceThatContradictsTheDates) {
+  add_three();
+  const std::string text = "1403636579\n1403636584\n1403636589\n";
+  const std::string said = complaint_of_stamps(text);
+  EXPECT_NE(said.find("dates in s, while the pace is one in ms, expected --unit"), std::string::npos) << said;
+  EXPECT_EQ(read_stamps(text, StampUnit::kSeconds).images.back().utime, 1403636589000000);
+}
+
+TEST_F(ImportImages, SaysHowManyPicturesTheStampsLeaveOut) {
+  add_three();
+  const Recording r = read_stamps("1.5 a10.jpg\n1.6 a9.png\n");
+  ASSERT_EQ(r.notices.size(), 1U);
+  EXPECT_NE(r.notices[0].find("names 2 of 3 pictures, the others were left out"), std::string::npos);
+}
+
 TEST_F(ImportImages, TakesStampsWithNamesAndCountsTheAbsent) {
   add_three();
   const Recording r = read_stamps("1.5,a10.jpg\n1.6, a9.png\n1.7,gone.png\n");

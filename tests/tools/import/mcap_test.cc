@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "ipc/log.h"
 #include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
@@ -41,7 +43,9 @@ TEST_F(ImportMcap, ReadsImagesCalibrationImuAndWheels) {
     const Recording r = read_bag(file(), choice);
     EXPECT_EQ(r.cameras[0].parameters.fx_px, 50.0);
     EXPECT_EQ(r.cameras[0].parameters.cy_px, 23.0);
-    EXPECT_EQ(r.cameras[0].parameters.distortion[1], 0.01);
+    EXPECT_EQ(r.cameras[0].parameters.fy_px, 51.0);
+    EXPECT_EQ(r.cameras[0].parameters.cx_px, 31.0);
+    EXPECT_EQ(r.cameras[0].parameters.distortion, (std::array<double, 5>{-0.1, 0.01, 0.002, -0.003, 0.0004}));
     ASSERT_EQ(r.images.size(), 3U);
     EXPECT_EQ(r.images[1].utime, kStart + 50'000);
     ASSERT_EQ(r.imu.size(), 10U);

@@ -161,5 +161,17 @@ TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
   }
 }
 
+// ffmpeg follows the names in a playlist: whoever wrote it would choose what is read.
+TEST_F(ImportVideo, APlaylistIsNoVideo) {
+  if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
+  put(root_ / "0.png", make_image(".png", 64, 48, 10));
+  const ProgramResult made = run_shell("ffmpeg -v error -y -i '" + (root_ / "0.png").string() +
+                                       "' -c:v ffv1 -f matroska '" + (root_ / "other.mkv").string() + "'");
+  ASSERT_EQ(made.status, 0) << made.err;
+  fs::remove_all(root_ / "bin");
+  put(video(), "ffconcat version 1.0\nfile other.mkv\n");
+  expect_refused({video().string()});
+}
+
 }  // namespace
 }  // namespace farpoint::tools

@@ -52,8 +52,8 @@ def image(sequence, nanoseconds, encoding):
 def camera_info():
     numbers = [50.0, 0, 31, 0, 51, 23, 0, 0, 1]
     return (header(0, 0) + struct.pack("<II", 48, 64) + text("plumb_bob") + struct.pack("<I", 5) +
-            struct.pack("<5d", -0.1, 0.01, 0, 0, 0) + struct.pack("<9d", *numbers) +
-            struct.pack("<9d", 1, 0, 0, 0, 1, 0, 0, 0, 1) + struct.pack("<12d", *numbers, 0, 0, 0) +
+            struct.pack("<5d", -0.1, 0.01, 0.002, -0.003, 0.0004) + struct.pack("<9d", *numbers) +
+            struct.pack("<9d", 1, 0, 0, 0, 1, 0, 0, 0, 1) + struct.pack("<12d", 70, 0, 32, 0, 0, 71, 24, 0, 0, 0, 1, 0) +
             struct.pack("<II", 0, 0) + struct.pack("<IIIIB", 0, 0, 0, 0, 0))
 
 
@@ -89,9 +89,10 @@ def main():
     parser.add_argument("--no-info", action="store_true")
     parser.add_argument("--second-camera", action="store_true")
     parser.add_argument("--jpeg")
+    parser.add_argument("--image-name", default="/cam0/image_raw")
     options = parser.parse_args()
 
-    topics = [("/cam0/image_raw", "sensor_msgs/Image"), ("/imu", "sensor_msgs/Imu"), ("/odom", "nav_msgs/Odometry"),
+    topics = [(options.image_name, "sensor_msgs/Image"), ("/imu", "sensor_msgs/Imu"), ("/odom", "nav_msgs/Odometry"),
               ("/chatter", "std_msgs/String")]
     if not options.no_info:
         topics.append(("/cam0/camera_info", "sensor_msgs/CameraInfo"))

@@ -46,8 +46,8 @@ def image(number, nanoseconds):
 
 def camera_info():
     k = [50.0, 0, 31, 0, 51, 23, 0, 0, 1]
-    return (Cdr().header(0, "cam0").pack("I", 48, 64).text("plumb_bob").pack("I", 5).pack("d", -0.1, 0.01, 0, 0, 0)
-            .pack("d", *k).pack("d", 1, 0, 0, 0, 1, 0, 0, 0, 1).pack("d", *k, 0, 0, 0).pack("I", 0, 0)
+    return (Cdr().header(0, "cam0").pack("I", 48, 64).text("plumb_bob").pack("I", 5).pack("d", -0.1, 0.01, 0.002, -0.003, 0.0004)
+            .pack("d", *k).pack("d", 1, 0, 0, 0, 1, 0, 0, 0, 1).pack("d", 70, 0, 32, 0, 0, 71, 24, 0, 0, 0, 1, 0).pack("I", 0, 0)
             .pack("I", 0, 0, 0, 0).pack("B", 0).bytes())
 
 
