@@ -190,7 +190,8 @@ SplineWeights spline(float t) {
 
 void sample_patch(const float* smooth, const PatchSampling& s, PatchTemplate* out) {
   for (int at = 0; at < kTemplateCount; ++at) {
-    const auto i = static_cast<float>(at % kTemplateSide), j = static_cast<float>(at / kTemplateSide);
+    const int column = at % kTemplateSide, row = at / kTemplateSide;
+    const auto i = static_cast<float>(column), j = static_cast<float>(row);
     const float x = (s.x0 + s.xj * j) + s.xi * i, y = (s.y0 + s.yj * j) + s.yi * i;
     const int nearest_x = static_cast<int>(std::floor(x + 0.5F)),
               nearest_y = static_cast<int>(std::floor(y + 0.5F));

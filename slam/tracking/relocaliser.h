@@ -32,8 +32,8 @@ class Relocaliser {
   // that should be found are found, or those found contradict each other.
   TrackOutcome relocalise(const Frame& frame, const Motion& last);
 
-  // Work of the last frame, in units of about a nanosecond, and the most that a frame of one camera begins with
-  // its last search.
+  // Work of the last frame, in units of about a nanosecond, and the most that a frame of one camera begins
+  // with its last search.
   [[nodiscard]] double work() const { return work_; }
   static constexpr double kMostWork = 1.5e6;
 

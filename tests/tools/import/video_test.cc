@@ -161,7 +161,7 @@ TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
   }
 }
 
-// ffmpeg follows the names in a playlist: whoever wrote it would choose what is read.
+// ffmpeg follows the names in a playlist: the file itself would choose what is read.
 TEST_F(ImportVideo, APlaylistIsNoVideo) {
   if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
   put(root_ / "0.png", make_image(".png", 64, 48, 10));
