@@ -37,7 +37,7 @@ struct PnpResult {
   SE3 T_camera_world;
   std::vector<uint8_t> inlier;  // one a match: within the 99 % limit of chi-square with 2 degrees of freedom
   size_t inliers = 0;
-  int samples = 0;       // of three matches that were tried
+  int samples = 0;       // of three matches that were tried; 0 where none gave a pose
   double rms_rad = 0.0;  // of the inliers' bearing errors, per component
 };
 

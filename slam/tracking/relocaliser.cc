@@ -20,10 +20,11 @@ constexpr float kWindowRatio = 0.8F, kImageRatio = 0.75F;
 constexpr double kCornerSigma_px = 2.0;
 // The whole view anywhere in the image is searched in slices, every fourth landmark in each.
 constexpr std::size_t kSlices = 4;
-// What a frame may spend before no further search begins, and what the steps cost, in units of about one
-// nanosecond of a core in use. Counted, not measured: the same frames are searched alike everywhere.
+// Work after which a frame begins no further search, except the first of those in turn
+// (Relocaliser::kMostWork). A unit is about one nanosecond of a core in use. It is counted, not measured: all
+// machines search alike.
 constexpr double kWorkOfFrame = 0.7e6;
-// One search of those in turn begins all the same, up to Relocaliser::kMostWork.
+// Work of the steps: a word compared, a descriptor compared, a sample of PnP, a match refined.
 constexpr double kWorkOfWord = 1.5, kWorkOfDescriptor = 3.0, kWorkOfSample = 1500.0, kWorkOfMatch = 5000.0;
 // Least share of right matches. Of matches at random a tenth fits some pose.
 constexpr double kLeastRight = 0.2;
@@ -74,6 +75,7 @@ TrackOutcome Relocaliser::relocalise(const Frame& frame, const Motion& last) {
   using enum LandmarkSubset;
   const std::array<Search, 2> always{{{kRecent, &moved}, {kRecent, nullptr}}};
   const Search around{kAll, &moved};
+  static_assert(kSlices == 4, "each slice stands once below");
   const std::array<Search, 1 + 2 * kSlices> in_turn{{around,
                                                      {kAll, nullptr, 0, kSlices},
                                                      around,

@@ -27,13 +27,14 @@ class Relocaliser {
   void listen(StageListener* listener) { listener_ = listener; }
 
   // Searches the landmarks seen last, in each camera's image by itself: around where the motion would have
-  // led, where the vehicle was last, and anywhere in the image. Then a part of the whole view, another one
-  // with each frame. `last`: the last confirmed motion. Needs a view. Not ok where too few of the landmarks
-  // that should be found are found, or those found contradict each other.
+  // led, then anywhere in the image. Then searches a part of the whole view, or the landmarks seen last
+  // around where the vehicle stood. The next frame goes on where the work of this one ended. `last`: the last
+  // confirmed motion. Needs a view. Not ok where too few of the landmarks that should be found are found, or
+  // those found contradict each other.
   TrackOutcome relocalise(const Frame& frame, const Motion& last);
 
-  // Work of the last frame, in units of about a nanosecond, and the most that a frame of one camera begins
-  // with its last search.
+  // Work of the last frame, in units of about a nanosecond. Beyond kMostWork a frame begins no search in
+  // turn.
   [[nodiscard]] double work() const { return work_; }
   static constexpr double kMostWork = 1.5e6;
 

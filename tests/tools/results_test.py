@@ -467,6 +467,12 @@ class Manifest(unittest.TestCase):
                 sections = set(re.findall(r"^(\w+):", (ROOT / file).read_text(), re.MULTILINE)) if names else set()
                 self.assertLessEqual(set(names.split(",")) - {""}, sections, f"{table.name}: {path}")
 
+    def test_each_script_that_takes_the_programs_folder_is_given_it(self):
+        scripts = {command.split()[0] for table in manifest.TABLES for command in table.commands
+                   if command.startswith("tools/")}
+        taking = {script for script in scripts if "\n  --bin DIR" in (ROOT / script).read_text()}
+        self.assertEqual(taking, set(making.TAKING_BIN))
+
     def test_every_command_exists(self):
         lists = "\n".join(path.read_text() for folder in ("tests", "daemon", "tools")
                           for path in (ROOT / folder).glob("CMakeLists.txt"))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cells of the tables of runs, tests and scenarios: (columns, rows) from a result."""
 
+from .spread import percentile
+
 CASES = {"kitti03": "KITTI 03, first half", "euroc": "EuRoC MH_01, part, camera 0", "town": "`town`, 40 s"}
 
 
@@ -109,11 +111,6 @@ def searching_cells(label, cpu_ms, valid):
     return [label, f"{len(cpu_ms['tracking'])}, {len(cpu_ms['searching'])}",
             *[", ".join(f"{ms:.1f}" for ms in ends[kind]) for kind in ("tracking", "searching")],
             f"{ends['searching'][1] / ends['tracking'][1]:.2f}", f"{max(cpu_ms['lost']):.1f}", valid]
-
-
-def percentile(values, percent):
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, percent * len(ordered) // 100)]
 
 
 def beside(load):

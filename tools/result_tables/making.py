@@ -33,9 +33,9 @@ def filled(command, places):
     return command
 
 
-# They draw progress on standard error.
-TALKING = ("tools/compare_modes", "tools/live_runs", "tools/hil/bench")
-TAKING_BIN = ("tools/compare_modes", "tools/live_runs")
+# Scripts that run programs of the build; they draw progress on standard error.
+TAKING_BIN = ("tools/compare_modes", "tools/live_runs", "tools/lost_runs")
+TALKING = (*TAKING_BIN, "tools/hil/bench")
 
 
 def make_row(table, row, places):

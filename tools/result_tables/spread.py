@@ -19,6 +19,12 @@ def ratios(pairs, value):
     return found
 
 
+def percentile(values, percent):
+    """The value at this rank, in percent of their number; the largest for 100."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, percent * len(ordered) // 100)]
+
+
 def known(values):
     return [v for v in values if v is not None]
 

@@ -5,11 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 
-#include <algorithm>
-
-#include "ipc/log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/import/recording_log.h"
@@ -37,13 +36,7 @@ class ImportBag : public testing::Test {
   // The images of the log that the recording becomes.
   [[nodiscard]] std::vector<image_t> images_of(const Recording& recording) const {
     write_recording(recording, root_ / "run.lcm");
-    std::vector<image_t> images;
-    ipc::LogReader reader((root_ / "run.lcm").string());
-    for (ipc::LogEvent event; reader.next(&event);) {
-      image_t image{};
-      if (event.channel == "CAMERA_0" && ipc::decode(event.data, &image)) images.push_back(image);
-    }
-    return images;
+    return test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0");
   }
   // Replaces bytes of the bag.
   void patch(const std::string& from, const std::string& to) const { replace_in(bag(), from, to); }

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "ipc/log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/tools/tool_support.h"
 #include "tools/import/recording_log.h"
 
@@ -220,10 +220,7 @@ TEST_F(ImportImages, TheProgramWritesALogWithTheFilesBytes) {
   EXPECT_EQ(done.status, 0) << done.err;
   EXPECT_NE(done.out.find("1 camera, 3 images (0 missing)"), std::string::npos) << done.out;
   int images = 0;
-  ipc::LogReader reader(log);
-  for (ipc::LogEvent event; reader.next(&event);) {
-    image_t image{};
-    if (event.channel != "CAMERA_0" || !ipc::decode(event.data, &image)) continue;
+  for (const image_t& image : test::messages_of<image_t>(log, "CAMERA_0")) {
     EXPECT_EQ(image.utime, 50'000 * images);
     EXPECT_EQ(std::string(image.data.begin(), image.data.end()),
               get(pictures() / ("f" + std::to_string(images) + ".jpg")));

@@ -6,7 +6,7 @@
 
 #include <array>
 
-#include "ipc/log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
 #include "tools/import/bag.h"
@@ -60,11 +60,8 @@ TEST_F(ImportMcap, ReadsImagesCalibrationImuAndWheels) {
 TEST_F(ImportMcap, PixelsAreThoseOfTheMessage) {
   write("--chunks");
   write_recording(read_bag(file(), {}), root_ / "run.lcm");
-  ipc::LogReader reader((root_ / "run.lcm").string());
   std::size_t images = 0;
-  for (ipc::LogEvent event; reader.next(&event);) {
-    image_t image{};
-    if (event.channel != "CAMERA_0" || !ipc::decode(event.data, &image)) continue;
+  for (const image_t& image : test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0")) {
     ASSERT_EQ(image.size, 64 * 48);
     for (std::size_t i = 0; i < image.data.size(); ++i)
       ASSERT_EQ(image.data[i], (i % 64 + i / 64 + images) % 256) << i;

@@ -9,7 +9,7 @@
 #include <cstdlib>
 
 #include "ipc/image_codec.h"
-#include "ipc/log.h"
+#include "tests/ipc/log_events.h"
 #include "tests/tools/tool_support.h"
 
 namespace farpoint::tools {
@@ -55,13 +55,13 @@ class ImportVideo : public testing::Test {
     return run_shell(command);
   }
   [[nodiscard]] std::vector<image_t> images() const {
-    std::vector<image_t> images;
-    ipc::LogReader reader((root_ / "run.lcm").string());
-    for (ipc::LogEvent event; reader.next(&event);) {
-      image_t image{};
-      if (event.channel == "CAMERA_0" && ipc::decode(event.data, &image)) images.push_back(image);
-    }
-    return images;
+    return test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0");
+  }
+  [[nodiscard]] static ipc::GreyImage grey_of(const image_t& image) {
+    ipc::ImageDecoder decoder;
+    ipc::GreyImage grey;
+    EXPECT_EQ(decoder.decode(image, &grey), ipc::ImageStatus::kOk);
+    return grey;
   }
   void expect_refused(const std::vector<std::string>& parts, const std::string& more = "") const {
     const ProgramResult result = import(more);
@@ -79,13 +79,11 @@ TEST_F(ImportVideo, FramesAndTheirTimesComeFromTheTwoPrograms) {
   ASSERT_EQ(done.status, 0) << done.err;
   const std::vector<image_t> frames = images();
   ASSERT_EQ(frames.size(), 3U);
-  ipc::ImageDecoder decoder;
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(frames[i].utime, static_cast<std::int64_t>(40'000 * i));
     EXPECT_EQ(frames[i].pixel_format, image_t::PIXEL_FORMAT_PNG);
-    ipc::GreyImage grey;
-    ASSERT_EQ(decoder.decode(frames[i], &grey), ipc::ImageStatus::kOk);
-    EXPECT_EQ(grey.pixels, std::vector<std::uint8_t>(64 * 48, static_cast<std::uint8_t>('A' + i)));
+    EXPECT_EQ(grey_of(frames[i]).pixels,
+              std::vector<std::uint8_t>(64 * 48, static_cast<std::uint8_t>('A' + i)));
   }
   // The name is an address of a file, not an option or another protocol.
   for (const char* name : {"ffprobe.arguments", "ffmpeg.arguments"})
@@ -97,9 +95,8 @@ TEST_F(ImportVideo, APartSkipsTheFramesBeforeIt) {
   const std::vector<image_t> frames = images();
   ASSERT_EQ(frames.size(), 1U);
   EXPECT_EQ(frames[0].utime, 100'000) << "by --rate";
-  ipc::GreyImage grey;
-  ipc::ImageDecoder decoder;
-  ASSERT_EQ(decoder.decode(frames[0], &grey), ipc::ImageStatus::kOk);
+  const ipc::GreyImage grey = grey_of(frames[0]);
+  ASSERT_FALSE(grey.pixels.empty());
   EXPECT_EQ(grey.pixels[0], 'B');
 }
 
@@ -151,11 +148,10 @@ TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
   ASSERT_EQ(done.status, 0) << done.err;
   const std::vector<image_t> frames = images();
   ASSERT_EQ(frames.size(), 5U);
-  ipc::ImageDecoder decoder;
   for (std::size_t i = 0; i < 5; ++i) {
     EXPECT_EQ(frames[i].utime, static_cast<std::int64_t>(40'000 * i));
-    ipc::GreyImage grey;
-    ASSERT_EQ(decoder.decode(frames[i], &grey), ipc::ImageStatus::kOk);
+    const ipc::GreyImage grey = grey_of(frames[i]);
+    ASSERT_EQ(grey.pixels.size(), std::size_t{64 * 48});
     for (std::size_t k = 0; k < grey.pixels.size(); ++k)
       ASSERT_EQ(grey.pixels[k], static_cast<std::uint8_t>(k % 64 + k / 64 + 10 * i)) << i << " " << k;
   }
