@@ -52,8 +52,6 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   matcher_.drop_outliers();
   matcher_.project(frame, T_world_body_start, LandmarkSubset::kAll);
   out.expected = static_cast<int>(matcher_.candidates().size());
-  for (const MatchCandidate& c : matcher_.candidates())
-    out.usually_found += double{matcher_.view()->landmarks[c.view_index].found_share};
   matcher_.match(frame, config_.local_search_px, kLocalRatio);
   matcher_.align(frame);
   out.matches = static_cast<int>(matcher_.matches().size());

@@ -181,6 +181,8 @@ TrackOutcome Relocaliser::pose_from_correspondences(const Frame& frame, int inde
   if (!s.ok) return {};
   TrackOutcome out = refiner_.refine(frame, s.T_world_body);
   work_ += kWorkOfMatch * out.matches;
+  for (const MatchCandidate& c : matcher_.candidates())
+    out.usually_found += double{matcher_.view()->landmarks[c.view_index].found_share};
   out.ok = out.ok && out.inliers >= config_.min_inliers && out.agreed();
   return out;
 }

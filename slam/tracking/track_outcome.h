@@ -15,7 +15,7 @@ struct TrackOutcome {
   int reference_inliers = 0;               // inliers among the reference keyframe's landmarks
   double reference_nearness = 0;           // sum of their nearness, 1 / map units
   int expected = 0;                        // landmarks that project into the image
-  double usually_found = 0;                // of these, by their share of frames that found them
+  double usually_found = 0;                // of these, by their share of frames; relocalisation only
   double median_motion_px = 0;             // of inliers since the reference keyframe, without rotation
   double rms = 0;                          // of the inliers' residuals, in sigmas
 
@@ -24,6 +24,7 @@ struct TrackOutcome {
   // Whether the matched landmarks agree on the pose.
   [[nodiscard]] bool agreed() const { return inliers >= kMinAgreement * matches; }
   // Of the landmarks that are usually found when they project into the image, those found here: about a half.
+  // 1 where usually_found is not counted.
   [[nodiscard]] double found_share() const { return usually_found > 0.0 ? inliers / usually_found : 1.0; }
 };
 
