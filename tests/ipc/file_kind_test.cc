@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/file_kind.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <fstream>
 #include <string_view>
 
@@ -62,6 +66,23 @@ TEST(FileKind, APipeIsNotWaitedFor) {
   const std::string pipe = scratch.path("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_EQ(wrong_kind(pipe, "an LCM log"), "");
+}
+
+// Its writer would be ended by the reader that goes.
+TEST(FileKind, APipeIsNotOpened) {
+  const test::Scratch scratch;
+  const std::string pipe = scratch.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+  ASSERT_GE(watch, 0);
+  ASSERT_GE(inotify_add_watch(watch, pipe.c_str(), IN_OPEN), 0);
+  EXPECT_EQ(wrong_kind(pipe, "an LCM log"), "");
+  std::array<char, 4096> events{};
+  EXPECT_LT(read(watch, events.data(), events.size()), 0) << "it was opened";
+  const int opened = open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  EXPECT_GT(read(watch, events.data(), events.size()), 0) << "an opening is seen";
+  close(opened);
+  close(watch);
 }
 
 }  // namespace

@@ -147,7 +147,8 @@ void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& opt
 int import_video(const ImportOptions& options) {
   Recording recording = read_video(options.folder, options.camera_file, options.times.rate_hz);
   const slam::Camera::Parameters& camera = recording.cameras[0].parameters;
-  VideoFrames frames(options.folder, camera.width_px, camera.height_px);
+  VideoFrames frames(options.folder, camera.width_px, camera.height_px,
+                     static_cast<std::int64_t>(recording.images.size()));
   return write_and_report(std::move(recording), options,
                           [&](const RecordingImage& image) { return frames.frame(image.sequence); });
 }
@@ -166,6 +167,7 @@ void add_video_command(CLI::App* import, const std::shared_ptr<ImportOptions>& o
   add_part(video, options.get());
   video->footer(
       "Frames become grey PNG images of the size in the file, whatever orientation the file asks for.\n"
+      "A raw MJPEG stream has no times and needs --rate.\n"
       "Example: farpoint import video drive.mp4 --camera front.yaml -o drive.lcm");
   video->callback([=] { *action = [=] { return import_video(*options); }; });
 }

@@ -20,10 +20,17 @@ namespace {
 
 constexpr off_t kComplaintBytes = 64 << 10;
 
+// A parent that ignores SIGCHLD hands that down; waitpid() then has no status of any child.
+void keep_exit_statuses() {
+  struct sigaction action {};
+  if (sigaction(SIGCHLD, nullptr, &action) == 0 && action.sa_handler == SIG_IGN) signal(SIGCHLD, SIG_DFL);
+}
+
 }  // namespace
 
 ChildProcess::ChildProcess(std::vector<std::string> arguments, const std::string& package)
     : error_fd_(memfd_create("standard error", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
+  keep_exit_statuses();
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) argv.push_back(argument.data());

@@ -13,8 +13,8 @@ namespace farpoint::tools {
 
 class ChildProcess {
  public:
-  // Starts arguments[0], looked up in PATH; its standard input is empty. Throws InputError where it is not
-  // installed, naming `package`.
+  // Starts arguments[0], looked up in PATH; its standard input is empty. Ends ignoring SIGCHLD. Throws
+  // InputError where the program is not installed, naming `package`.
   ChildProcess(std::vector<std::string> arguments, const std::string& package);
   // Ends it where it still runs.
   ~ChildProcess();
@@ -23,9 +23,9 @@ class ChildProcess {
 
   // Reads its standard output until the buffer is full or the output ends; returns the bytes read.
   [[nodiscard]] std::size_t read(std::span<char> buffer);
-  // Waits for its end; returns the exit status, -1 after a signal.
+  // Waits for its end; returns the exit status, -1 after a signal or where others took the status.
   [[nodiscard]] int wait();
-  // The last line it wrote to standard error; empty: none.
+  // The last line of the first 64 KiB that it wrote to standard error; empty: none.
   [[nodiscard]] std::string complaint() const;
 
  private:

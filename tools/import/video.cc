@@ -11,6 +11,7 @@
 #include "ipc/image_encoder.h"
 #include "tools/common/child_process.h"
 #include "tools/common/errors.h"
+#include "tools/import/byte_file.h"
 
 namespace farpoint::tools {
 namespace {
@@ -54,12 +55,41 @@ void take_line(std::string_view line, Probe* probe) {
 constexpr const char* kFormats =
     "mov,matroska,webm,avi,mpegts,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,flv,asf,ogg,ivf,obu,yuv4mpegpipe";
 
+// JPEG pictures one after another (MJPEG): no container, and no times.
+bool is_raw_jpeg(const fs::path& file) {
+  constexpr std::string_view kJpeg = "\xff\xd8\xff";
+  const ByteFile content(file);
+  return content.size() >= kJpeg.size() && content.read(0, kJpeg.size()) == kJpeg;
+}
+
+using Arguments = std::vector<std::string>;
+
+// `program` with the options of its input: what it may open and how it reads that.
+Arguments begin_of(const char* program, const char* protocols, const fs::path& file) {
+  Arguments arguments = {program, "-v", "error", "-protocol_whitelist", protocols, "-format_whitelist",
+                         kFormats};
+  if (is_raw_jpeg(file)) arguments.insert(arguments.end(), {"-f", "mjpeg"});
+  return arguments;
+}
+
+Arguments probe_arguments(const fs::path& file) {
+  Arguments arguments = begin_of("ffprobe", "file", file);
+  arguments.insert(arguments.end(), {"-select_streams", "v:0", "-show_entries",
+                                     "stream=width,height:frame=best_effort_timestamp_time", "-of",
+                                     "default=nw=1", address_of(file)});
+  return arguments;
+}
+
+Arguments decoder_arguments(const fs::path& file) {
+  Arguments arguments = begin_of("ffmpeg", "file,pipe", file);
+  arguments.insert(arguments.end(),
+                   {"-nostdin", "-noautorotate", "-i", address_of(file), "-map", "0:v:0", "-fps_mode",
+                    "passthrough", "-f", "rawvideo", "-pix_fmt", "gray", "pipe:1"});
+  return arguments;
+}
+
 Probe probe_video(const fs::path& file) {
-  ChildProcess child(
-      {"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-format_whitelist", kFormats,
-       "-select_streams", "v:0", "-show_entries", "stream=width,height:frame=best_effort_timestamp_time",
-       "-of", "default=nw=1", address_of(file)},
-      "ffmpeg");
+  ChildProcess child(probe_arguments(file), "ffmpeg");
   Probe probe;
   std::string rest;
   std::vector<char> buffer(1 << 16);
@@ -110,11 +140,24 @@ void add_frames(const fs::path& file, const Probe& probe, double rate_hz, Record
   }
 }
 
-void check_file(const fs::path& file) {
+void check_file(const fs::path& file, double rate_hz) {
   if (!fs::exists(file)) throw InputError(file.string() + ": no such file, expected a video");
   if (fs::is_directory(file)) throw InputError(file.string() + ": is a folder, expected a video file");
+  if (!fs::is_regular_file(file))
+    throw InputError(file.string() + ": is a pipe or a device, expected a video file, which is read twice");
   const std::string wrong = ipc::wrong_kind(file.string(), "a video");
-  if (!wrong.empty() && wrong.find(" video, expected") == std::string::npos) throw InputError(wrong);
+  if (wrong.empty() || wrong.find(" video, expected") != std::string::npos) return;
+  if (!is_raw_jpeg(file)) throw InputError(wrong);
+  if (rate_hz == 0.0)
+    throw InputError(file.string() +
+                     ": JPEG without a container, which has no times, expected --rate HZ with a stream of "
+                     "pictures; 'farpoint import images' takes a folder of them");
+}
+
+// A JPEG file alone is a picture.
+void refuse_picture(const fs::path& file, const Probe& probe) {
+  if (probe.times_s.size() == 1 && is_raw_jpeg(file))
+    throw InputError(ipc::wrong_kind(file.string(), "a video"));
 }
 
 }  // namespace
@@ -122,10 +165,11 @@ void check_file(const fs::path& file) {
 Recording read_video(const fs::path& file, const fs::path& camera_file, double rate_hz) {
   if (rate_hz != 0.0 && !(rate_hz >= kMinRate_hz && rate_hz <= kMaxRate_hz))
     throw InputError("--rate: expected frames a second, 0.001 to 10000");
-  check_file(file);
+  check_file(file, rate_hz);
   Recording recording;
   add_camera(camera_file, "camera", &recording);
   const Probe probe = probe_video(file);
+  refuse_picture(file, probe);
   const slam::Camera::Parameters& camera = recording.cameras[0].parameters;
   if (probe.width_px != camera.width_px || probe.height_px != camera.height_px) {
     throw InputError(file.string() + ": frames of " + std::to_string(probe.width_px) + "x" +
@@ -139,54 +183,45 @@ Recording read_video(const fs::path& file, const fs::path& camera_file, double r
 }
 
 struct VideoFrames::Decoder {
-  Decoder(fs::path video, int width, int height)
+  Decoder(fs::path video, int width, int height, std::int64_t frame_count)
       : file(std::move(video)),
         width_px(width),
         height_px(height),
+        frames(frame_count),
         pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
-        child({"ffmpeg",
-               "-v",
-               "error",
-               "-nostdin",
-               "-protocol_whitelist",
-               "file,pipe",
-               "-format_whitelist",
-               kFormats,
-               "-noautorotate",
-               "-i",
-               address_of(file),
-               "-map",
-               "0:v:0",
-               "-fps_mode",
-               "passthrough",
-               "-f",
-               "rawvideo",
-               "-pix_fmt",
-               "gray",
-               "pipe:1"},
-              "ffmpeg") {}
+        child(decoder_arguments(file), "ffmpeg") {}
+
+  void read_frame() {
+    const std::span buffer(reinterpret_cast<char*>(pixels.data()), pixels.size());
+    if (child.read(buffer) == pixels.size()) return;
+    (void)child.wait();
+    refuse(file, child, "ends before frame " + std::to_string(next) + ", expected what ffprobe counted");
+  }
+
+  // With a frame more, each frame's time could be that of another.
+  void require_end() {
+    char more = 0;
+    if (child.read({&more, 1}) != 0)
+      refuse(file, child, "more frames than the " + std::to_string(frames) + " that ffprobe counted");
+  }
 
   fs::path file;
   int width_px, height_px;
+  std::int64_t frames;  // that ffprobe counted
   std::vector<std::uint8_t> pixels;
   std::int64_t next = 0;  // number of the frame that comes next
   ChildProcess child;
 };
 
-VideoFrames::VideoFrames(fs::path file, int width_px, int height_px)
-    : decoder_(std::make_unique<Decoder>(std::move(file), width_px, height_px)) {}
+VideoFrames::VideoFrames(fs::path file, int width_px, int height_px, std::int64_t frames)
+    : decoder_(std::make_unique<Decoder>(std::move(file), width_px, height_px, frames)) {}
 
 VideoFrames::~VideoFrames() = default;
 
 std::string VideoFrames::frame(std::int64_t number) {
   Decoder& d = *decoder_;
-  for (; d.next <= number; ++d.next) {
-    const std::span buffer(reinterpret_cast<char*>(d.pixels.data()), d.pixels.size());
-    if (d.child.read(buffer) == d.pixels.size()) continue;
-    (void)d.child.wait();
-    refuse(d.file, d.child,
-           "ends before frame " + std::to_string(d.next) + ", expected what ffprobe counted");
-  }
+  for (; d.next <= number; ++d.next) d.read_frame();
+  if (d.next == d.frames) d.require_end();
   const std::vector<std::uint8_t> png = ipc::encode_png({d.width_px, d.height_px, d.pixels});
   return {png.begin(), png.end()};
 }

@@ -11,21 +11,23 @@
 
 namespace farpoint::tools {
 
-// Times are the video's own, or frame i is at i / rate_hz where rate_hz is not 0. Frames are not turned,
-// whatever the file says of its orientation. Throws InputError, also where ffprobe is not installed.
+// Times are the video's own, or frame i is at i / rate_hz where rate_hz is not 0, which a raw MJPEG stream
+// needs. Frames are not turned, whatever the file says of its orientation. Throws InputError, also where
+// ffprobe is not installed.
 [[nodiscard]] Recording read_video(const std::filesystem::path& file,
                                    const std::filesystem::path& camera_file, double rate_hz);
 
 // The frames of a video, one after another.
 class VideoFrames {
  public:
-  VideoFrames(std::filesystem::path file, int width_px, int height_px);
+  // `frames`: how many ffprobe counted.
+  VideoFrames(std::filesystem::path file, int width_px, int height_px, std::int64_t frames);
   ~VideoFrames();
   VideoFrames(const VideoFrames&) = delete;
   VideoFrames& operator=(const VideoFrames&) = delete;
 
   // Frame `number` as a PNG file; earlier ones are skipped. Precondition: numbers rise. Throws InputError
-  // where the video has no such frame, with what ffmpeg said.
+  // with ffmpeg's complaint where the video has no such frame, and after the last where it has more.
   [[nodiscard]] std::string frame(std::int64_t number);
 
  private:

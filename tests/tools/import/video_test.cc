@@ -4,6 +4,7 @@
 #include "tools/import/video.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -42,13 +43,16 @@ class ImportVideo : public testing::Test {
     put(file, text);
     fs::permissions(file, fs::perms::owner_all);
   }
-  [[nodiscard]] ProgramResult import(const std::string& more = "") const {
+  // `before` stands before the command.
+  [[nodiscard]] ProgramResult import(const std::string& more = "", const std::string& before = "") const {
     const char* const path = std::getenv("PATH");
-    return import_with_path((root_ / "bin").string().append(":").append(path != nullptr ? path : ""), more);
+    return import_with_path((root_ / "bin").string().append(":").append(path != nullptr ? path : ""), more,
+                            before);
   }
-  [[nodiscard]] ProgramResult import_with_path(const std::string& path, const std::string& more) const {
-    std::string command = "PATH='";
-    command.append(path).append("' ").append(program());
+  [[nodiscard]] ProgramResult import_with_path(const std::string& path, const std::string& more,
+                                               const std::string& before = "") const {
+    std::string command = before;
+    command.append(" PATH='").append(path).append("' ").append(program());
     command.append(" import video '").append(video().string()).append("' --camera '");
     command.append((root_ / "camera.yaml").string()).append("' -o '");
     command.append((root_ / "run.lcm").string()).append("' ").append(more);
@@ -122,6 +126,65 @@ TEST_F(ImportVideo, SaysWhatIsWrongWithTheDecoder) {
   expect_refused({"a drive.mp4", "ends before frame 1", "Invalid data found"});
   set("ffprobe", "exec nowhere-to-be-found");
   expect_refused({"expected a video that ffprobe reads"});
+}
+
+// Then the times are not those of the frames.
+TEST_F(ImportVideo, MoreFramesThanCountedAreRefused) {
+  set("ffmpeg", "for c in A B C D; do head -c 3072 /dev/zero | tr '\\0' $c; done");
+  expect_refused({"a drive.mp4", "more frames than the 3 that ffprobe counted"});
+  set("ffmpeg", "for c in A B C; do head -c 3072 /dev/zero | tr '\\0' $c; done; echo");
+  expect_refused({"more frames than the 3"});
+  EXPECT_EQ(import("--frames 2").status, 0) << "the end is not decoded";
+}
+
+TEST_F(ImportVideo, AnIgnoredSigchldHidesNoStatus) {
+  const ProgramResult done = import("", "trap '' CHLD;");
+  EXPECT_EQ(done.status, 0) << done.err;
+}
+
+TEST_F(ImportVideo, APipeIsNotWaitedFor) {
+  fs::remove(video());
+  ASSERT_EQ(mkfifo(video().c_str(), 0600), 0);
+  set("ffprobe", "cat '" + video().string() + "'");
+  const ProgramResult result = import("", "exec timeout 20 env");
+  EXPECT_EQ(result.status, 2);
+  expect_all_in(result.err, {"a drive.mp4", "is a pipe", "expected a video file"});
+}
+
+// ---- raw MJPEG streams ----
+
+TEST_F(ImportVideo, ARawStreamOfJpegNeedsARate) {
+  put(video(), make_image(".jpg", 64, 48, 0).append(make_image(".jpg", 64, 48, 1)));
+  expect_refused({"has no times", "--rate HZ", "import images"});
+  ASSERT_EQ(import("--rate 10").status, 0);
+  EXPECT_EQ(images().at(2).utime, 200'000);
+  for (const char* name : {"ffprobe.arguments", "ffmpeg.arguments"})
+    EXPECT_NE(get(root_ / name).find("-f mjpeg"), std::string::npos) << "read as what it is, not as a picture";
+}
+
+TEST_F(ImportVideo, APictureIsNoVideo) {
+  put(video(), make_image(".jpg", 64, 48, 0));
+  set("ffprobe", "printf 'width=64\\nheight=48\\nbest_effort_timestamp_time=0\\n'");
+  expect_refused({"a JPEG picture, expected a video", "import images"}, "--rate 10");
+}
+
+TEST_F(ImportVideo, TheRealProgramsReadARawStreamOfJpeg) {
+  if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
+  std::string stream;
+  for (int i = 0; i < 30; ++i) stream += make_image(".jpg", 64, 48, 4 * i);
+  put(video(), stream);
+  fs::remove_all(root_ / "bin");
+  const ProgramResult done = import("--rate 5");
+  ASSERT_EQ(done.status, 0) << done.err;
+  const std::vector<image_t> frames = images();
+  ASSERT_EQ(frames.size(), 30U);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].utime, static_cast<std::int64_t>(200'000 * i));
+    EXPECT_NEAR(grey_of(frames[i]).pixels.at(64 * 20 + 20), 40.0 + 4.0 * static_cast<double>(i), 3.0) << i;
+  }
+  put(video(), make_image(".jpg", 64, 48, 0));
+  fs::remove(root_ / "run.lcm");
+  expect_refused({"a JPEG picture, expected a video", "import images"}, "--rate 10");
 }
 
 TEST_F(ImportVideo, WithoutFfmpegItNamesThePackage) {
