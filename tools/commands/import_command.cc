@@ -121,26 +121,38 @@ int import_bag(const ImportOptions& options) {
 }
 
 void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
-  CLI::App* bag = import->add_subcommand("bag", "A ROS 1 bag or an MCAP recording of ROS, not compressed");
+  CLI::App* bag = import->add_subcommand(
+      "bag", "A recording of ROS: a ROS 1 bag, MCAP, or a ROS 2 bag (.db3 or its folder)");
   bag->add_option("FILE", options->folder, "The bag")->required();
   bag->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced");
   bag->add_flag("--list", options->list,
                 "Print the topics with type and number of messages, and write nothing");
   bag->add_option("--image", options->bag.image, "Topic of the images (default: the only one)");
+  bag->add_option("--second-image", options->bag.second_image,
+                  "Topic of a second camera's images, which become CAMERA_1");
   bag->add_option("--camera", options->camera_file,
                   "Camera file or calibration (default: the topic camera_info beside the images)");
+  bag->add_option("--second-camera", options->bag.second_camera_file,
+                  "The same for the second camera; both files name T_body_camera");
   bag->add_option("--imu", options->bag.imu, "Topic of the IMU, or 'none' (default: the only one)");
   bag->add_option(
       "--wheels", options->bag.wheels,
       "Topic of odometry or twist whose forward speed and yaw rate become WHEELS (default: none)");
+  bag->add_option("--truth", options->bag.truth,
+                  "Topic of odometry, pose, transform or point that becomes GROUND_TRUTH (default: none)");
   add_part(bag, options.get());
   bag->footer(
       "Images of sensor_msgs/Image are stored as grey, those of CompressedImage as they are (PNG or JPEG).\n"
-      "A message's time is its header's. 'rosbag decompress' and 'mcap decompress' write files without "
-      "compression.\n"
+      "A message's time is its header's. Chunks may be compressed (bz2, lz4, zstd). Without --second-camera "
+      "the\n"
+      "second camera's place follows from R and P of camera_info, as stereo calibrations have them. Images up "
+      "to\n"
+      "5 ms apart are a pair.\n"
       "Examples:\n"
       "  farpoint import bag drive.bag --list\n"
-      "  farpoint import bag drive.bag --image /cam0/image_raw -o drive.lcm");
+      "  farpoint import bag drive.bag --image /cam0/image_raw -o drive.lcm\n"
+      "  farpoint import bag drive.db3 --image /left/image_raw --second-image /right/image_raw \\\n"
+      "    --camera camchain.yaml#cam0 --second-camera camchain.yaml#cam1 --truth /vicon/body -o drive.lcm");
   bag->callback([=] { *action = [=] { return import_bag(*options); }; });
 }
 

@@ -2,13 +2,15 @@
 #include "tools/import/bag.h"
 
 #include <algorithm>
-#include <functional>
+#include <array>
+#include <cmath>
 #include <map>
+#include <utility>
 
 #include "daemon/config/camera_file.h"
+#include "daemon/config/yaml_file.h"
 #include "tools/common/errors.h"
-#include "tools/import/mcap.h"
-#include "tools/import/ros_bag.h"
+#include "tools/import/bag_file.h"
 #include "tools/import/ros_message.h"
 
 namespace farpoint::tools {
@@ -17,83 +19,34 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxSmallMessageBytes = 64 << 10;  // of all types except images
+constexpr std::int64_t kPairTolerance_us = 5'000;          // as drivers/camera pairs live images
 constexpr const char* kImage = "sensor_msgs/Image";
 constexpr const char* kCompressedImage = "sensor_msgs/CompressedImage";
 constexpr const char* kCameraInfo = "sensor_msgs/CameraInfo";
 constexpr const char* kImu = "sensor_msgs/Imu";
 constexpr const char* kOdometry = "nav_msgs/Odometry";
-constexpr const char* kTwist = "geometry_msgs/TwistStamped";
+constexpr const char* kTransform = "geometry_msgs/TransformStamped";
+constexpr const char* kPoint = "geometry_msgs/PointStamped";
 
-using Topics = std::map<std::string, BagTopic>;
+const TopicTypes& image_types() {
+  static const TopicTypes kTypes = {kImage, kCompressedImage};
+  return kTypes;
+}
+const TopicTypes& wheel_types() {
+  static const TopicTypes kTypes = {kOdometry, "geometry_msgs/TwistStamped",
+                                    "geometry_msgs/TwistWithCovarianceStamped"};
+  return kTypes;
+}
+const TopicTypes& truth_types() {
+  static const TopicTypes kTypes = {kOdometry, "geometry_msgs/PoseStamped",
+                                    "geometry_msgs/PoseWithCovarianceStamped", kTransform, kPoint};
+  return kTypes;
+}
+
 using Bytes = std::span<const std::uint8_t>;
 
 Bytes bytes_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
-
-Topics topics_of(const ByteFile& file) {
-  Topics topics;
-  std::map<std::uint32_t, std::string> names;
-  read_bag_file(
-      file,
-      [&](const BagConnection& connection) {
-        names[connection.id] = connection.topic;
-        BagTopic& topic = topics[connection.topic];
-        topic.name = connection.topic;
-        topic.type = connection.type;
-      },
-      [&](const BagMessage& message) { ++topics[names[message.connection]].messages; });
-  return topics;
-}
-
-bool is_of(const BagTopic& topic, const std::vector<std::string>& types) {
-  return std::find(types.begin(), types.end(), topic.type) != types.end();
-}
-
-std::string names_of(const Topics& topics, const std::vector<std::string>& types) {
-  std::string names;
-  for (const auto& [name, topic] : topics)
-    if (is_of(topic, types)) names += (names.empty() ? "" : ", ") + name;
-  return names;
-}
-
-// The topic that was asked for, checked to be of one of the types.
-const BagTopic& chosen(const ByteFile& file, const Topics& topics, const std::string& name,
-                       const char* option, const std::vector<std::string>& types) {
-  const auto found = topics.find(name);
-  if (found != topics.end() && is_of(found->second, types)) return found->second;
-  const std::string names = names_of(topics, types);
-  throw InputError(
-      file.path().string() + ": " + option + " " + name + ": " +
-      (found == topics.end() ? "no such topic" : "of type " + found->second.type) + ", expected " +
-      (names.empty() ? "a topic of type " + types.front() + ", of which there is none" : "one of " + names));
-}
-
-const BagTopic& image_topic(const ByteFile& file, const Topics& topics, const std::string& name) {
-  const std::vector<std::string> types = {kImage, kCompressedImage};
-  if (!name.empty()) return chosen(file, topics, name, "--image", types);
-  const BagTopic* only = nullptr;
-  for (const auto& [key, topic] : topics) {
-    if (!is_of(topic, types)) continue;
-    if (only != nullptr)
-      throw InputError(file.path().string() + ": several image topics, expected --image with one of " +
-                       names_of(topics, types));
-    only = &topic;
-  }
-  if (only == nullptr)
-    throw InputError(file.path().string() + ": no topic of type " + kImage + " or " + kCompressedImage +
-                     ", expected images of a camera (--list prints all topics)");
-  return *only;
-}
-
-std::string imu_topic(const ByteFile& file, const Topics& topics, const std::string& name,
-                      Recording* recording) {
-  if (name == "none") return "";
-  if (!name.empty()) return chosen(file, topics, name, "--imu", {kImu}).name;
-  const std::string names = names_of(topics, {kImu});
-  if (names.find(',') == std::string::npos) return names;
-  recording->notices.push_back(file.path().string() + ": no IMU was taken, --imu chooses one of " + names);
-  return "";
 }
 
 // "/cam0/image_raw/compressed" and "/cam0/image_raw" -> "/cam0/camera_info".
@@ -102,6 +55,50 @@ std::string camera_info_topic(std::string image) {
   if (image.ends_with(kSuffix)) image.resize(image.size() - kSuffix.size());
   const std::size_t slash = image.rfind('/');
   return (slash == std::string::npos ? "" : image.substr(0, slash + 1)) + "camera_info";
+}
+
+// ---- the topics that are taken ----
+
+struct Topic {
+  std::string name, type;  // empty: none
+  [[nodiscard]] bool is(const BagConnection& connection) const {
+    return !name.empty() && connection.topic == name && connection.type == type;
+  }
+};
+
+struct ChosenTopics {
+  std::vector<Topic> images, infos;  // one for each camera
+  Topic imu, wheels, truth;
+};
+
+Topic topic_of(const BagTopic& topic) {
+  return {topic.name, topic.type};
+}
+
+Topic choose_imu(const BagTopics& topics, const std::string& name, const std::string& bag,
+                 Recording* recording) {
+  const std::size_t count = topics.count_of({kImu});
+  if (name == "none" || (name.empty() && count == 0)) return {};
+  if (!name.empty() || count == 1) return topic_of(topics.require(name, "--imu", {kImu}));
+  recording->notices.push_back(bag + ": no IMU was taken, --imu chooses one of " + topics.names_of({kImu}));
+  return {};
+}
+
+ChosenTopics choose(const BagTopics& topics, const BagChoice& choice, const std::string& bag,
+                    Recording* recording) {
+  ChosenTopics chosen;
+  chosen.images = {topic_of(topics.require(choice.image, "--image", image_types()))};
+  if (!choice.second_image.empty())
+    chosen.images.push_back(topic_of(topics.require(choice.second_image, "--second-image", image_types())));
+  if (chosen.images.size() == 2 && chosen.images[0].name == chosen.images[1].name)
+    throw InputError(bag + ": --second-image " + choice.second_image +
+                     ": is the first camera's topic, expected another");
+  for (const Topic& image : chosen.images) chosen.infos.push_back({camera_info_topic(image.name), kCameraInfo});
+  chosen.imu = choose_imu(topics, choice.imu, bag, recording);
+  if (!choice.wheels.empty())
+    chosen.wheels = topic_of(topics.require(choice.wheels, "--wheels", wheel_types()));
+  if (!choice.truth.empty()) chosen.truth = topic_of(topics.require(choice.truth, "--truth", truth_types()));
+  return chosen;
 }
 
 // ---- messages into the recording ----
@@ -116,95 +113,93 @@ constexpr EncodingName kEncodings[] = {
     {"bgra8", RawEncoding::kBgra8}, {"yuv422", RawEncoding::kUyvy8}, {"yuv422_yuy2", RawEncoding::kYuyv8},
 };
 
+std::int64_t time_of(std::int64_t header_utime, const BagMessage& message) {
+  return header_utime != 0 ? header_utime : (message.received_ns + 500) / 1000;
+}
+
 class Collector {
  public:
-  Collector(const ByteFile& file, const Topics& topics, const BagChoice& choice, Recording* recording)
-      : file_(file), recording_(recording) {
-    const BagTopic& image = image_topic(file, topics, choice.image);
-    image_ = image.name;
-    compressed_ = image.type == kCompressedImage;
-    imu_ = imu_topic(file, topics, choice.imu, recording);
-    if (!choice.wheels.empty()) {
-      const BagTopic& wheels = chosen(file, topics, choice.wheels, "--wheels", {kOdometry, kTwist});
-      wheels_ = wheels.name;
-      wheels_are_odometry_ = wheels.type == kOdometry;
-    }
-    if (choice.camera_file.empty()) camera_info_ = camera_info_topic(image_);
+  Collector(const ChosenTopics& topics, Recording* recording)
+      : topics_(topics), recording_(recording), infos_(topics.images.size()) {}
+
+  // Takes all that was chosen of one file.
+  void take_all(BagFile* bag) {
+    bag_ = bag;
+    connections_.clear();
+    bag->read_all([&](const BagConnection& connection) { connections_[connection.id] = connection; },
+                  [&](const BagMessage& message) { take(message, connections_[message.connection]); });
   }
 
-  void connect(const BagConnection& connection) { connections_[connection.id] = connection; }
-
-  void take(const BagMessage& message) {
-    const BagConnection& connection = connections_[message.connection];
-    const std::string& topic = connection.topic;
-    packing_ = connection.packing;
-    if (topic == image_) {
-      take_image(message);
-    } else if (topic == imu_) {
-      take_imu(message);
-    } else if (topic == wheels_) {
-      take_wheels(message);
-    } else if (topic == camera_info_ && calibration_.empty()) {
-      const std::optional<std::string> text = read_ros_camera_info(bytes_of(content(message)), packing_);
-      if (!text) file_.fail(message.offset, "a damaged message on " + camera_info_);
-      calibration_ = *text;
-    }
-  }
-
-  // The calibration of camera_info, for an error with the topic's name.
-  [[nodiscard]] const std::string& calibration() const { return calibration_; }
-  [[nodiscard]] const std::string& camera_info() const { return camera_info_; }
-  [[nodiscard]] const std::string& image() const { return image_; }
+  // Of each camera; empty where there was no message.
+  [[nodiscard]] const std::vector<std::optional<RosCameraInfo>>& infos() const { return infos_; }
   [[nodiscard]] std::uint64_t damaged() const { return damaged_; }
 
  private:
+  void take(const BagMessage& message, const BagConnection& connection) {
+    for (std::size_t camera = 0; camera < topics_.images.size(); ++camera) {
+      if (topics_.images[camera].is(connection)) take_image(message, connection, static_cast<int>(camera));
+      if (topics_.infos[camera].is(connection)) take_info(message, connection, &infos_[camera]);
+    }
+    // Odometry may be both.
+    if (topics_.imu.is(connection)) take_imu(message, connection);
+    if (topics_.wheels.is(connection)) take_wheels(message, connection);
+    if (topics_.truth.is(connection)) take_truth(message, connection);
+  }
+
   [[nodiscard]] std::string content(const BagMessage& message) const {
     if (message.bytes > kMaxSmallMessageBytes)
-      file_.fail(message.offset,
+      bag_->fail(message.place,
                  "a message of " + std::to_string(message.bytes) + " bytes, expected at most 65536");
-    return file_.read(message.offset, message.bytes);
+    return bag_->read(message.place, message.bytes);
   }
 
-  [[nodiscard]] static std::int64_t time_of(std::int64_t header_utime, const BagMessage& message) {
-    return header_utime != 0 ? header_utime : (message.received_ns + 500) / 1000;
+  void take_info(const BagMessage& message, const BagConnection& connection,
+                 std::optional<RosCameraInfo>* info) {
+    if (info->has_value()) return;
+    *info = read_ros_camera_info(bytes_of(content(message)), connection.packing);
+    if (!info->has_value()) bag_->fail(message.place, "a damaged message on " + connection.topic);
   }
 
-  void take_image(const BagMessage& message) {
+  void take_image(const BagMessage& message, const BagConnection& connection, int camera) {
     const std::string head =
-        file_.read(message.offset, std::min<std::uint64_t>(message.bytes, kImageHeadBytes));
+        bag_->read(message.place, std::min<std::uint64_t>(message.bytes, kImageHeadBytes));
+    const bool compressed = connection.type == kCompressedImage;
     const std::optional<RosImage> found =
-        compressed_ ? read_ros_compressed_image(bytes_of(head), message.bytes, packing_)
-                    : read_ros_image(bytes_of(head), message.bytes, packing_);
+        compressed ? read_ros_compressed_image(bytes_of(head), message.bytes, connection.packing)
+                   : read_ros_image(bytes_of(head), message.bytes, connection.packing);
     if (!found) {
       ++damaged_;
       return;
     }
     RecordingImage image;
     image.utime = time_of(found->utime, message);
-    image.file = file_.path();
-    image.offset = message.offset + found->data_offset;
+    image.camera = camera;
+    image.file = bag_->path();
+    image.part = message.place.part;
+    image.offset = message.place.offset + found->data_offset;
     image.bytes = found->data_bytes;
-    if (!compressed_) image.raw = raw_of(*found, message);
+    if (!compressed) image.raw = raw_of(*found, message, connection.topic);
     recording_->images.push_back(image);
   }
 
-  [[nodiscard]] RawImage raw_of(const RosImage& found, const BagMessage& message) const {
+  [[nodiscard]] RawImage raw_of(const RosImage& found, const BagMessage& message,
+                                const std::string& topic) const {
     const auto* const known = std::find_if(std::begin(kEncodings), std::end(kEncodings),
                                            [&](const EncodingName& e) { return e.name == found.encoding; });
     if (known == std::end(kEncodings)) {
-      file_.fail(message.offset,
-                 image_ + ": encoding '" + found.encoding +
+      bag_->fail(message.place,
+                 topic + ": encoding '" + found.encoding +
                      "', expected mono8, rgb8, bgr8, rgba8, bgra8 or yuv422 ('image_proc' converts)");
     }
     RawImage raw{known->encoding, found.width_px, found.height_px, found.row_bytes};
     if (raw.row_bytes < static_cast<std::size_t>(raw.width_px) * bytes_a_pixel(raw.encoding))
-      file_.fail(message.offset, image_ + ": rows of " + std::to_string(raw.row_bytes) + " bytes for " +
-                                     std::to_string(raw.width_px) + " pixels of " + found.encoding);
+      bag_->fail(message.place, topic + ": rows of " + std::to_string(raw.row_bytes) + " bytes for " +
+                                    std::to_string(raw.width_px) + " pixels of " + found.encoding);
     return raw;
   }
 
-  void take_imu(const BagMessage& message) {
-    const std::optional<RosImu> found = read_ros_imu(bytes_of(content(message)), packing_);
+  void take_imu(const BagMessage& message, const BagConnection& connection) {
+    const std::optional<RosImu> found = read_ros_imu(bytes_of(content(message)), connection.packing);
     if (!found) {
       ++damaged_;
       return;
@@ -213,10 +208,11 @@ class Collector {
         {time_of(found->utime, message), found->angular_velocity_radps, found->acceleration_mps2});
   }
 
-  void take_wheels(const BagMessage& message) {
+  void take_wheels(const BagMessage& message, const BagConnection& connection) {
     const std::string bytes = content(message);
-    const std::optional<RosTwist> found = wheels_are_odometry_ ? read_ros_odometry(bytes_of(bytes), packing_)
-                                                               : read_ros_twist(bytes_of(bytes), packing_);
+    const std::optional<RosTwist> found = connection.type == kOdometry
+                                              ? read_ros_odometry(bytes_of(bytes), connection.packing)
+                                              : read_ros_twist(bytes_of(bytes), connection.packing);
     if (!found) {
       ++damaged_;
       return;
@@ -224,69 +220,186 @@ class Collector {
     recording_->wheels.push_back({time_of(found->utime, message), found->speed_mps, found->yaw_rate_radps});
   }
 
-  const ByteFile& file_;
+  void take_truth(const BagMessage& message, const BagConnection& connection) {
+    const bool point = connection.type == kPoint;
+    const bool of_child = connection.type == kOdometry || connection.type == kTransform;
+    const RosPoseLayout layout = point      ? RosPoseLayout::kPoint
+                                 : of_child ? RosPoseLayout::kOfChild
+                                            : RosPoseLayout::kPose;
+    const std::optional<RosPose> found =
+        read_ros_pose(bytes_of(content(message)), connection.packing, layout);
+    if (!found) {
+      ++damaged_;
+      return;
+    }
+    if (point) recording_->truth_has_orientation = false;
+    recording_->truth.push_back({time_of(found->utime, message), found->T_world_body});
+  }
+
+  const ChosenTopics& topics_;
   Recording* recording_;
+  BagFile* bag_ = nullptr;  // at hand
   std::map<std::uint32_t, BagConnection> connections_;
-  RosPacking packing_ = RosPacking::kRos1;          // of the message at hand
-  std::string image_, imu_, wheels_, camera_info_;  // topics; empty: none
-  std::string calibration_;
-  bool compressed_ = false, wheels_are_odometry_ = false;
+  std::vector<std::optional<RosCameraInfo>> infos_;
   std::uint64_t damaged_ = 0;
 };
 
-// Sorts by time and drops samples of a time that is there already.
+// ---- order ----
+
+int camera_of(const RecordingImage& image) {
+  return image.camera;
+}
+template <typename Sample>
+int camera_of(const Sample& /*unused*/) {
+  return 0;
+}
+
+// Sorts by time, camera 0 first, and drops samples of a time that is there already.
 template <typename Sample>
 std::size_t order(std::vector<Sample>* samples) {
-  const auto before = [](const Sample& a, const Sample& b) { return a.utime < b.utime; };
-  const auto same = [](const Sample& a, const Sample& b) { return a.utime == b.utime; };
-  std::stable_sort(samples->begin(), samples->end(), before);
+  const auto key = [](const Sample& sample) { return std::pair(sample.utime, camera_of(sample)); };
+  std::stable_sort(samples->begin(), samples->end(),
+                   [&](const Sample& a, const Sample& b) { return key(a) < key(b); });
   const std::size_t count = samples->size();
+  const auto same = [&](const Sample& a, const Sample& b) { return key(a) == key(b); };
   samples->erase(std::unique(samples->begin(), samples->end(), same), samples->end());
   return count - samples->size();
 }
 
-void set_camera(const ByteFile& file, const BagChoice& choice, const Collector& collector,
-                Recording* recording) {
-  if (!choice.camera_file.empty()) return add_camera(choice.camera_file, "camera", recording);
-  if (collector.calibration().empty())
-    throw InputError(file.path().string() + ": no message on " + collector.camera_info() +
-                     ", the calibration of " + collector.image() + "; expected --camera FILE");
-  // Its K and distortion are of the raw image.
-  if (collector.image().find("image_rect") != std::string::npos)
-    throw InputError(file.path().string() + ": " + collector.image() + ": rectified images, while " +
-                     collector.camera_info() +
-                     " describes raw ones; expected --camera FILE, or --image of raw ones");
-  const std::string name = file.path().string() + ", " + collector.camera_info();
-  add_camera(daemon::parse_camera_file(collector.calibration(), name), name, "camera", recording);
+// Images of a pair have one number. Precondition: ordered.
+void number_images(std::size_t cameras, Recording* recording) {
+  std::array<std::vector<RecordingImage*>, 2> of_camera;
+  for (RecordingImage& image : recording->images)
+    of_camera[static_cast<std::size_t>(image.camera)].push_back(&image);
+  std::int64_t number = 0;
+  std::size_t left = 0, right = 0;
+  while (left < of_camera[0].size() || right < of_camera[1].size()) {
+    RecordingImage* const first = left < of_camera[0].size() ? of_camera[0][left] : nullptr;
+    RecordingImage* const second = right < of_camera[1].size() ? of_camera[1][right] : nullptr;
+    const bool both = first != nullptr && second != nullptr;
+    const bool first_comes = !both || first->utime <= second->utime + kPairTolerance_us;
+    const bool second_comes = !both || second->utime <= first->utime + kPairTolerance_us;
+    if (first != nullptr && first_comes) of_camera[0][left++]->sequence = number;
+    if (second != nullptr && second_comes) of_camera[1][right++]->sequence = number;
+    const bool alone = !both || !first_comes || !second_comes;
+    if (cameras == 2 && alone) ++recording->missing_images;
+    ++number;
+  }
+}
+
+// ---- cameras ----
+
+class Cameras {
+ public:
+  Cameras(const std::string& bag, const ChosenTopics& topics, const BagChoice& choice, Recording* recording)
+      : bag_(bag), topics_(topics), choice_(choice), recording_(recording) {}
+
+  void add(const std::vector<std::optional<RosCameraInfo>>& infos) {
+    const bool pair = topics_.images.size() == 2;
+    if (pair && choice_.camera_file.empty() != choice_.second_camera_file.empty())
+      throw InputError(bag_ + ": expected --camera and --second-camera for two cameras, or neither of them");
+    if (!pair && !choice_.second_camera_file.empty())
+      throw InputError(bag_ + ": --second-camera: expected with --second-image");
+    if (!choice_.camera_file.empty()) {
+      add_files(pair);
+    } else {
+      for (std::size_t camera = 0; camera < infos.size(); ++camera) add_info(camera, infos[camera]);
+      if (pair) place_second(*infos[0], *infos[1]);
+    }
+  }
+
+ private:
+  [[nodiscard]] std::string name_of(std::size_t camera) const {
+    return topics_.images.size() == 1 ? "camera" : "camera" + std::to_string(camera);
+  }
+
+  void add_files(bool pair) {
+    if (!pair) return add_camera(choice_.camera_file, name_of(0), recording_);
+    std::size_t camera = 0;
+    for (const fs::path& file : {choice_.camera_file, choice_.second_camera_file}) {
+      const daemon::CameraFile content = daemon::read_camera_file(file);
+      if (!content.T_body_camera)
+        throw InputError(file.string() +
+                         ": no T_body_camera, expected it (or mount) in both cameras' files: where one stands "
+                         "relative to the other");
+      add_camera(content, file.string(), name_of(camera++), recording_);
+    }
+  }
+
+  void add_info(std::size_t camera, const std::optional<RosCameraInfo>& info) {
+    const std::string &image = topics_.images[camera].name, &topic = topics_.infos[camera].name;
+    if (!info)
+      throw InputError(bag_ + ": no message on " + topic + ", the calibration of " + image +
+                       "; expected --camera FILE");
+    // Its K and distortion are of the raw image.
+    if (image.find("image_rect") != std::string::npos)
+      throw InputError(bag_ + ": " + image + ": rectified images, while " + topic +
+                       " describes raw ones; expected --camera FILE, or --image of raw ones");
+    const std::string origin = bag_ + ", " + topic;
+    add_camera(daemon::parse_camera_file(info->calibration, origin), origin, name_of(camera), recording_);
+  }
+
+  // The rectified cameras have parallel axes and stand beside one another.
+  void place_second(const RosCameraInfo& first, const RosCameraInfo& second) {
+    constexpr double kMaxBaseline_m = 10.0;
+    const double right_m = second.right_m - first.right_m;
+    slam::SE3 R_first, R_second;
+    if (!(std::abs(right_m) > 1e-6 && std::abs(right_m) < kMaxBaseline_m) ||
+        !rotation_of(first, &R_first) || !rotation_of(second, &R_second))
+      throw InputError(bag_ + ": " + topics_.infos[1].name +
+                       " has no rectification of a pair (R, and fx * baseline in P), expected --camera and "
+                       "--second-camera with T_body_camera");
+    const slam::SE3 T_first_second =
+        R_first.inverse() * slam::SE3{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}} * R_second;
+    recording_->cameras[1].T_body_camera = recording_->cameras[0].T_body_camera * T_first_second;
+  }
+
+  static bool rotation_of(const RosCameraInfo& info, slam::SE3* rotation) {
+    Eigen::Matrix<double, 3, 4> matrix = Eigen::Matrix<double, 3, 4>::Zero();
+    matrix.leftCols<3>() = info.rectification;
+    return info.rectification.allFinite() && daemon::to_rigid_motion(matrix, rotation);
+  }
+
+  const std::string& bag_;
+  const ChosenTopics& topics_;
+  const BagChoice& choice_;
+  Recording* recording_;
+};
+
+void note_left_out(const std::string& bag, std::uint64_t damaged, std::size_t doubled, Recording* recording) {
+  if (damaged > 0)
+    recording->notices.push_back(bag + ": " + std::to_string(damaged) + " damaged messages were left out");
+  if (doubled > 0)
+    recording->notices.push_back(bag + ": " + std::to_string(doubled) +
+                                 " messages of a time that was there already were left out");
 }
 
 }  // namespace
 
-std::vector<BagTopic> list_bag(const fs::path& file) {
-  std::vector<BagTopic> list;
-  for (const auto& [name, topic] : topics_of(ByteFile(file))) list.push_back(topic);
-  return list;
+std::vector<BagTopic> list_bag(const fs::path& path) {
+  return BagTopics(files_of_bag(path)).all();
 }
 
 Recording read_bag(const fs::path& path, const BagChoice& choice) {
-  const ByteFile file(path);
+  const std::vector<fs::path> files = files_of_bag(path);
+  const std::string bag = path.string();
   Recording recording;
-  Collector collector(file, topics_of(file), choice, &recording);
-  read_bag_file(
-      file, [&](const BagConnection& connection) { collector.connect(connection); },
-      [&](const BagMessage& message) { collector.take(message); });
-  if (recording.images.empty())
-    throw InputError(path.string() + ": no image on " + collector.image() + " that can be read");
-  set_camera(file, choice, collector, &recording);
-  const std::size_t doubled = order(&recording.images) + order(&recording.imu) + order(&recording.wheels);
-  std::int64_t sequence = 0;
-  for (RecordingImage& image : recording.images) image.sequence = sequence++;
-  if (collector.damaged() > 0)
-    recording.notices.push_back(path.string() + ": " + std::to_string(collector.damaged()) +
-                                " damaged messages were left out");
-  if (doubled > 0)
-    recording.notices.push_back(path.string() + ": " + std::to_string(doubled) +
-                                " messages of a time that was there already were left out");
+  const ChosenTopics topics = choose(BagTopics(files), choice, bag, &recording);
+  Collector collector(topics, &recording);
+  for (const fs::path& file : files) collector.take_all(open_bag(file).get());
+  std::size_t doubled = order(&recording.images);
+  for (std::size_t camera = 0; camera < topics.images.size(); ++camera) {
+    const auto is_its = [&](const RecordingImage& image) { return image.camera == static_cast<int>(camera); };
+    if (std::none_of(recording.images.begin(), recording.images.end(), is_its))
+      throw InputError(bag + ": no image on " + topics.images[camera].name + " that can be read");
+  }
+  doubled += order(&recording.imu) + order(&recording.wheels) + order(&recording.truth);
+  number_images(topics.images.size(), &recording);
+  Cameras(bag, topics, choice, &recording).add(collector.infos());
+  note_left_out(bag, collector.damaged(), doubled, &recording);
+  if (!recording.truth.empty() && recording.body_name.empty())
+    recording.notices.push_back(bag + ": " + topics.truth.name +
+                                " is taken as the camera's place, since no --camera names the body");
   complete_cameras(path, &recording);
   return recording;
 }

@@ -1,22 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
-// The container MCAP, as ROS 2 records it: channels and messages in the order of the file. Messages stay in
-// the file; the index is not used.
+// The container MCAP, as ROS 2 records it, with chunks that are plain or compressed by lz4 or zstd.
 #pragma once
 
-#include <functional>
+#include <string_view>
 
-#include "tools/import/byte_file.h"
-#include "tools/import/ros_bag.h"
+#include "tools/import/bag_file.h"
 
 namespace farpoint::tools {
 
-// As read_ros_bag(): a channel is a connection. Types of other encodings than ROS's have the encoding before
-// their name. Throws InputError naming the byte.
-void read_mcap(const ByteFile& file, const std::function<void(const BagConnection&)>& on_connection,
-               const std::function<void(const BagMessage&)>& on_message);
+inline constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
 
-// Reads either container, chosen by the first bytes. Throws InputError for other files.
-void read_bag_file(const ByteFile& file, const std::function<void(const BagConnection&)>& on_connection,
-                   const std::function<void(const BagMessage&)>& on_message);
+// A channel is a connection.
+class McapFile : public ChunkedBag {
+ public:
+  using ChunkedBag::ChunkedBag;
+  void read_all(const OnConnection& on_connection, const OnMessage& on_message) override;
+
+ protected:
+  [[nodiscard]] Chunk load_chunk(std::uint64_t part) override;
+
+ private:
+  class Fields;
+  class Walk;
+  struct Record {
+    std::uint8_t kind = 0;
+    BagPlace place, data;
+    std::uint64_t data_bytes = 0;
+    [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
+  };
+  struct ChunkHead {
+    std::string compression;          // empty: none
+    std::uint64_t content_bytes = 0;  // decompressed
+    std::uint64_t offset = 0, bytes = 0;  // of its records in the file, as they are stored
+  };
+
+  // The record at `place`, which ends before byte `end` of its part.
+  [[nodiscard]] Record record_at(const BagPlace& place, std::uint64_t end);
+  // The first bytes of a record's data, at most `most`.
+  [[nodiscard]] Fields fields_of(const Record& record, std::uint64_t most);
+  [[nodiscard]] ChunkHead chunk_head_of(const Record& record);
+};
 
 }  // namespace farpoint::tools

@@ -2,6 +2,8 @@
 #include "tools/import/recording.h"
 
 #include <algorithm>
+#include <iterator>
+#include <set>
 #include <span>
 
 #include "daemon/config/camera_file.h"
@@ -121,21 +123,23 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
 
 void keep_part(std::int64_t first, std::int64_t frames, const std::string& recording_name,
                Recording* recording) {
-  std::vector<std::int64_t> instants;
-  for (const RecordingImage& image : recording->images)
-    if (instants.empty() || image.utime != instants.back()) instants.push_back(image.utime);
-  const auto count = static_cast<std::int64_t>(instants.size());
+  std::set<std::int64_t> numbers;  // of instants; a pair of images may be some milliseconds apart
+  for (const RecordingImage& image : recording->images) numbers.insert(image.sequence);
+  const auto count = static_cast<std::int64_t>(numbers.size());
   if (first < 0 || first >= count || frames < 0) {
     throw InputError(recording_name + ": --first " + std::to_string(first) + " --frames " +
                      std::to_string(frames) + ": expected a part of its " + std::to_string(count) +
                      " frames, 0 to " + std::to_string(count - 1));
   }
-  const std::int64_t last = frames == 0 ? count - 1 : std::min(first + frames, count) - 1;
-  const std::int64_t from = instants[static_cast<std::size_t>(first)],
-                     to = instants[static_cast<std::size_t>(last)];
+  const std::int64_t left_out = frames == 0 ? 0 : std::max<std::int64_t>(count - first - frames, 0);
+  const std::int64_t first_number = *std::next(numbers.begin(), first),
+                     last_number = *std::next(numbers.rbegin(), left_out);
+  std::erase_if(recording->images, [=](const RecordingImage& image) {
+    return image.sequence < first_number || image.sequence > last_number;
+  });
+  const std::int64_t from = recording->images.front().utime, to = recording->images.back().utime;
   // So that truth can be interpolated at the first and last image.
   constexpr std::int64_t kMargin_us = 500'000;
-  std::erase_if(recording->images, [=](const RecordingImage& i) { return i.utime < from || i.utime > to; });
   const auto outside = [=](const auto& sample) {
     return sample.utime < from - kMargin_us || sample.utime > to + kMargin_us;
   };

@@ -43,6 +43,7 @@ struct RecordingImage {
   int camera = 0;
   std::filesystem::path file;
   std::uint64_t offset = 0, bytes = 0;  // of the image in `file`; no bytes: all of it
+  std::uint64_t part = 0;  // of a bag, in which `offset` counts: compressed chunk or row; 0: the file itself
   RawImage raw{};
 };
 

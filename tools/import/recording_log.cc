@@ -10,7 +10,7 @@
 #include "ipc/log.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
-#include "tools/import/byte_file.h"
+#include "tools/import/bag_file.h"
 
 namespace farpoint::tools {
 namespace {
@@ -93,15 +93,24 @@ wheels_t to_message(const RecordingWheels& sample) {
   return message;
 }
 
-std::string bytes_of(const RecordingImage& image) {
-  return image.bytes == 0 ? read_image_file(image.file)
-                          : ByteFile(image.file).read(image.offset, image.bytes);
-}
+// Bytes of images in files. The bag that was read last stays open.
+class StoredImages {
+ public:
+  std::string operator()(const RecordingImage& image) {
+    if (image.bytes == 0) return read_image_file(image.file);
+    if (bag_ == nullptr || bag_->path() != image.file) bag_ = open_bag(image.file);
+    return bag_->read({image.part, image.offset}, image.bytes);
+  }
+
+ private:
+  std::shared_ptr<BagFile> bag_;  // shared: an ImageSource is copied
+};
 
 // Where the image is, for errors.
 std::filesystem::path name_of(const RecordingImage& image) {
   if (image.bytes == 0) return image.file;
-  return image.file.string() + ": byte " + std::to_string(image.offset);
+  const std::string part = image.part == 0 ? "" : "part " + std::to_string(image.part) + ", ";
+  return image.file.string() + ": " + part + "byte " + std::to_string(image.offset);
 }
 
 // A row of colour or luma samples as grey. ITU-R BT.601, as JPEG has it.
@@ -146,9 +155,9 @@ image_t to_message(const RecordingImage& image, const RecordingCamera& camera, c
   message.exposure_us = -1;
   message.gain = -1.0F;
   if (image.raw.encoding == RawEncoding::kNone) {
-    set_file(image, source ? source(image) : bytes_of(image), &message);
+    set_file(image, source(image), &message);
   } else {
-    set_pixels(image, bytes_of(image), &message);
+    set_pixels(image, source(image), &message);
   }
   if (message.width != camera.parameters.width_px || message.height != camera.parameters.height_px) {
     throw InputError(name_of(image).string() + ": expected " + std::to_string(camera.parameters.width_px) +
@@ -199,9 +208,10 @@ void write_recording(const Recording& recording, const std::filesystem::path& lo
   const std::unique_ptr<ipc::LogWriter> log = open_log(log_file);
   const std::int64_t first_utime = events.front().utime;  // every importer demands an image
   log->write_message(ipc::kCalibrationChannel, first_utime, calibration_message(recording, first_utime));
+  const ImageSource images = source ? source : StoredImages();
   Progress progress(log_file.filename().string(), events.size());
   for (std::size_t i = 0; i < events.size(); ++i) {
-    write_event(recording, events[i], source, log.get());
+    write_event(recording, events[i], images, log.get());
     if (!log->error().empty()) break;
     progress.advance(i + 1);
   }

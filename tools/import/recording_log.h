@@ -11,7 +11,7 @@
 
 namespace farpoint::tools {
 
-// The bytes of an image file, PNG or JPEG, for an image of a recording.
+// The bytes of an image of a recording: a PNG or JPEG file, or pixels as its `raw` describes them.
 using ImageSource = std::function<std::string(const RecordingImage&)>;
 
 // Copies the image files' bytes unchanged; with `source` each image's bytes are those that it returns, asked

@@ -1,32 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// The container of ROS 1, bag format 2.0: connections and messages in the order of the file. Messages stay in
-// the file. The bag's own index is not used, so a bag without one is read too.
+// The container of ROS 1, bag format 2.0, with chunks that are plain or compressed by bz2 or lz4.
 #pragma once
 
-#include <cstdint>
-#include <functional>
+#include <map>
 #include <string>
+#include <string_view>
 
-#include "tools/import/byte_file.h"
-#include "tools/import/ros_message.h"
+#include "tools/import/bag_file.h"
 
 namespace farpoint::tools {
 
-struct BagConnection {
-  std::uint32_t id = 0;
-  std::string topic, type;  // "/camera/image_raw", "sensor_msgs/Image"
-  RosPacking packing = RosPacking::kRos1;
-};
+inline constexpr std::string_view kRosBagMagic = "#ROSBAG V2.0\n";
 
-struct BagMessage {
-  std::uint32_t connection = 0;
-  std::int64_t received_ns = 0;
-  std::uint64_t offset = 0, bytes = 0;  // of its content in the file
-};
+class RosBag : public ChunkedBag {
+ public:
+  using ChunkedBag::ChunkedBag;
+  void read_all(const OnConnection& on_connection, const OnMessage& on_message) override;
 
-// Calls back for each connection once and for each message. Throws InputError naming the byte: damage, a cut
-// off end, lengths beyond their limits, compressed chunks.
-void read_ros_bag(const ByteFile& file, const std::function<void(const BagConnection&)>& on_connection,
-                  const std::function<void(const BagMessage&)>& on_message);
+ protected:
+  [[nodiscard]] Chunk load_chunk(std::uint64_t part) override;
+
+ private:
+  class Walk;
+  using Fields = std::map<std::string, std::string>;  // of a record's header
+  // One record. The header is parsed, the data stays where it is.
+  struct Record {
+    Fields header;
+    BagPlace place;  // of the record
+    BagPlace data;
+    std::uint64_t data_bytes = 0;
+    [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
+  };
+
+  // The record at `place`, which ends before byte `end` of its part.
+  [[nodiscard]] Record record_at(const BagPlace& place, std::uint64_t end);
+  [[nodiscard]] Fields fields_at(const BagPlace& place, std::uint64_t bytes);
+  // The length at `place`, checked to lie within its limit and before `end`.
+  [[nodiscard]] std::uint64_t length_at(const BagPlace& place, std::uint64_t most, std::uint64_t end,
+                                        const char* what);
+  // A field of the header of exactly `bytes`, and one of 4 as a number.
+  [[nodiscard]] std::string field(const Record& record, const std::string& name, std::size_t bytes) const;
+  [[nodiscard]] std::uint32_t number(const Record& record, const std::string& name) const;
+};
 
 }  // namespace farpoint::tools

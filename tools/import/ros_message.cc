@@ -43,8 +43,17 @@ std::string list_text(std::span<const double> values) {
   return text + "]";
 }
 
-bool is_word(std::string_view text) {
-  return std::all_of(text.begin(), text.end(), [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; });
+// Text between the quotes of a YAML file.
+std::string quotable(std::string_view text) {
+  std::string result(text);
+  for (char& c : result)
+    if (c < ' ' || c > '~' || c == '"' || c == '\\') c = '?';
+  return result;
+}
+
+// Where a rectified camera stands on the x axis that it shares with the pair's first: p = P's last column.
+double right_of(const std::array<double, 12>& p) {
+  return -p[3] / p[0];
 }
 
 std::optional<RosTwist> twist_of(RosFields* fields, std::int64_t utime) {
@@ -192,23 +201,47 @@ std::optional<RosTwist> read_ros_twist(std::span<const std::uint8_t> message, Ro
   return twist_of(&fields, utime);
 }
 
-std::optional<std::string> read_ros_camera_info(std::span<const std::uint8_t> message, RosPacking packing) {
+std::optional<RosPose> read_ros_pose(std::span<const std::uint8_t> message, RosPacking packing,
+                                     RosPoseLayout layout) {
+  constexpr double kTolerance = 0.01;
+  RosFields fields(message, packing);
+  RosPose pose;
+  pose.utime = fields.header_utime();
+  if (layout == RosPoseLayout::kOfChild) (void)fields.text();  // child_frame_id
+  const std::array<double, 3> position = numbers<3>(&fields);
+  pose.T_world_body.t = {position[0], position[1], position[2]};
+  if (layout != RosPoseLayout::kPoint) {
+    const std::array<double, 4> q = numbers<4>(&fields);  // x y z w
+    const Eigen::Quaterniond orientation(q[3], q[0], q[1], q[2]);
+    if (!all_finite(q) || std::abs(orientation.norm() - 1.0) > kTolerance) return {};
+    pose.T_world_body.q = orientation.normalized();
+  }
+  if (!fields.ok() || !all_finite(position)) return {};
+  return pose;
+}
+
+std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> message, RosPacking packing) {
   RosFields fields(message, packing);
   (void)fields.header_utime();
   const std::uint32_t height = fields.u32(), width = fields.u32();
-  const std::string model(fields.text());
-  constexpr std::size_t kMostCoefficients = 14;
+  const std::string model = quotable(fields.text());
+  constexpr std::size_t kMostCoefficients = 64;  // those of a model that is not supported, too
   std::vector<double> d(fields.list(sizeof(double), kMostCoefficients));
   for (double& value : d) value = fields.f64();
-  const std::array<double, 9> k = numbers<9>(&fields);
-  (void)numbers<9 + 12>(&fields);  // R and P, of rectified images
+  const std::array<double, 9> k = numbers<9>(&fields), r = numbers<9>(&fields);
+  const std::array<double, 12> p = numbers<12>(&fields);
   const std::uint32_t binning_x = fields.u32(), binning_y = fields.u32();
   const std::uint32_t x_offset = fields.u32(), y_offset = fields.u32();
-  if (!fields.ok() || !is_word(model) || !all_finite(d) || !all_finite(k)) return {};
-  return "width: " + std::to_string(width) + "\nheight: " + std::to_string(height) +
-         "\ndistortion_model: \"" + model + "\"\nD: " + list_text(d) + "\nK: " + list_text(k) +
-         "\nbinning_x: " + std::to_string(binning_x) + "\nbinning_y: " + std::to_string(binning_y) +
-         "\nroi: {x_offset: " + std::to_string(x_offset) + ", y_offset: " + std::to_string(y_offset) + "}\n";
+  if (!fields.ok() || !all_finite(d) || !all_finite(k)) return {};
+  RosCameraInfo info;
+  info.calibration = "width: " + std::to_string(width) + "\nheight: " + std::to_string(height) +
+                     "\ndistortion_model: \"" + model + "\"\nD: " + list_text(d) + "\nK: " + list_text(k) +
+                     "\nbinning_x: " + std::to_string(binning_x) + "\nbinning_y: " + std::to_string(binning_y) +
+                     "\nroi: {x_offset: " + std::to_string(x_offset) +
+                     ", y_offset: " + std::to_string(y_offset) + "}\n";
+  info.rectification = Eigen::Map<const Eigen::Matrix3d>(r.data()).transpose();
+  info.right_m = right_of(p);
+  return info;
 }
 
 }  // namespace farpoint::tools

@@ -60,10 +60,29 @@ struct RosImu {
   std::int64_t utime = 0;
   Eigen::Vector3d angular_velocity_radps, acceleration_mps2;
 };
-// Forward speed and yaw rate of nav_msgs/Odometry or geometry_msgs/TwistStamped.
+// Forward speed and yaw rate of nav_msgs/Odometry, geometry_msgs/TwistStamped or TwistWithCovarianceStamped.
 struct RosTwist {
   std::int64_t utime = 0;
   double speed_mps = 0.0, yaw_rate_radps = 0.0;
+};
+// Pose of nav_msgs/Odometry and of geometry_msgs' types with a time; a point has no orientation.
+struct RosPose {
+  std::int64_t utime = 0;
+  slam::SE3 T_world_body;
+};
+enum class RosPoseLayout : std::uint8_t {
+  kPose,     // PoseStamped, PoseWithCovarianceStamped
+  kOfChild,  // Odometry, TransformStamped: the child's frame stands before the pose
+  kPoint,    // PointStamped
+};
+// sensor_msgs/CameraInfo.
+struct RosCameraInfo {
+  std::string calibration;  // of the raw image, as a file's text, which daemon::parse_camera_file takes
+  // The rectified cameras of a stereo pair have parallel axes: R turns the raw camera's axes into theirs, and
+  // the camera stands `right_m` to the right of the pair's first; not finite where the message has no such R
+  // and P.
+  Eigen::Matrix3d rectification = Eigen::Matrix3d::Zero();
+  double right_m = 0.0;
 };
 
 // `head` is the beginning of a message of `message_bytes`: kImageHeadBytes of it, or all.
@@ -78,8 +97,10 @@ inline constexpr std::size_t kImageHeadBytes = 4096;
                                                         RosPacking packing);
 [[nodiscard]] std::optional<RosTwist> read_ros_twist(std::span<const std::uint8_t> message,
                                                      RosPacking packing);
-// sensor_msgs/CameraInfo as a calibration file's text, which daemon::parse_camera_file takes.
-[[nodiscard]] std::optional<std::string> read_ros_camera_info(std::span<const std::uint8_t> message,
-                                                              RosPacking packing);
+// Empty also for a quaternion of another length than 1.
+[[nodiscard]] std::optional<RosPose> read_ros_pose(std::span<const std::uint8_t> message, RosPacking packing,
+                                                   RosPoseLayout layout);
+[[nodiscard]] std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> message,
+                                                                RosPacking packing);
 
 }  // namespace farpoint::tools

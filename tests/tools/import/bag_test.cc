@@ -11,6 +11,7 @@
 #include "tests/ipc/log_events.h"
 #include "tests/support/paths.h"
 #include "tests/tools/tool_support.h"
+#include "tools/import/chunk.h"
 #include "tools/import/recording_log.h"
 #include "tools/import/ros_message.h"
 
@@ -34,12 +35,29 @@ class ImportBag : public testing::Test {
     return complaint_of([&] { (void)read_bag(bag(), choice); });
   }
   // The images of the log that the recording becomes.
-  [[nodiscard]] std::vector<image_t> images_of(const Recording& recording) const {
+  [[nodiscard]] std::vector<image_t> images_of(const Recording& recording,
+                                               const std::string& channel = "CAMERA_0") const {
     write_recording(recording, root_ / "run.lcm");
-    return test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0");
+    return test::messages_of<image_t>((root_ / "run.lcm").string(), channel);
   }
-  // Replaces bytes of the bag.
-  void patch(const std::string& from, const std::string& to) const { replace_in(bag(), from, to); }
+  // Imports it with other bytes at places by chance; returns how often that was read.
+  [[nodiscard]] int read_damaged(const std::string& whole, const BagChoice& choice,
+                                 std::mt19937* random) const {
+    int read = 0;
+    for (int round = 0; round < 150; ++round) {
+      std::string damaged = whole;
+      for (int i = 0; i < 3; ++i)
+        damaged[(*random)() % (round % 2 == 0 ? 4000 : damaged.size())] = static_cast<char>((*random)());
+      put(bag(), damaged);
+      try {
+        write_recording(read_bag(bag(), choice), root_ / "run.lcm");
+        ++read;
+      } catch (const std::exception& error) {
+        EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+      }
+    }
+    return read;
+  }
 
   ScratchFolder root_;
 };
@@ -110,6 +128,85 @@ TEST_F(ImportBag, ABagWithoutIndexIsReadToo) {
   EXPECT_EQ(read_bag(bag(), {}).images.size(), 3U);
 }
 
+// ---- compressed chunks ----
+
+TEST_F(ImportBag, CompressedChunksAreReadAsPlainOnes) {
+  for (const char* options : {"--compression bz2", "--compression lz4", "--compression bz2 --split",
+                              "--compression lz4 --split", "--split"}) {
+    write(options);
+    const Recording r = read_bag(bag(), {});
+    EXPECT_EQ(r.imu.size(), 10U) << options;
+    EXPECT_TRUE(r.notices.empty()) << options;
+    const std::vector<image_t> images = images_of(r);
+    ASSERT_EQ(images.size(), 3U) << options;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < images[i].data.size(); ++k)
+        ASSERT_EQ(images[i].data[k], (k % 64 + k / 64 + i) % 256) << options << " " << i << " " << k;
+  }
+}
+
+TEST_F(ImportBag, AChunkOfAnotherSizeThanItDeclaresIsRefused) {
+  for (const std::string compression : {"bz2", "lz4"}) {
+    for (const char* size : {"1", "1000", "20000"}) {
+      write("--compression " + compression + " --size " + size);
+      expect_all_in(complaint(), {"drive.bag: byte ", "a damaged chunk", std::string(size) + " bytes"});
+    }
+    // Before memory is taken.
+    write("--compression " + compression + " --size 4294967295");
+    expect_all_in(complaint(), {"a chunk of 4294967295 bytes, expected at most 128 MiB"});
+  }
+}
+
+TEST_F(ImportBag, DamageInACompressedChunkNamesTheByteThere) {
+  write("--compression bz2");
+  const std::string whole = get(bag());
+  put(bag(), whole.substr(0, whole.find("BZh") + 500));
+  expect_all_in(complaint(), {"are left", "rosbag reindex"});
+  std::string damaged = whole;
+  damaged[whole.find("BZh") + 300] ^= 1;
+  put(bag(), damaged);
+  expect_all_in(complaint(), {"drive.bag: byte ", "a damaged chunk"});
+  write("--compression lz4 --encoding bayer_rggb8");
+  expect_all_in(complaint(), {"compressed chunk, its byte ", "bayer_rggb8"});
+}
+
+TEST(Chunks, AContentThatIsLongerThanDeclaredEnds) {
+  const std::string packed = run_shell("head -c 300000 /dev/zero | lz4 -q -c").out;
+  const std::string bz2 = run_shell("head -c 300000 /dev/zero | bzip2 -c").out;
+  const std::string zstd = run_shell("head -c 300000 /dev/zero | zstd -q -c").out;
+  for (const auto& [kind, bytes] :
+       {std::pair{Compression::kLz4, packed}, {Compression::kBz2, bz2}, {Compression::kZstd, zstd}}) {
+    EXPECT_EQ(decompress(kind, bytes, 300'000).value().view(), std::string(300'000, '\0'));
+    for (const std::uint64_t size : {0, 1, 65'536, 299'999, 300'001, 1'000'000})
+      EXPECT_EQ(decompress(kind, bytes, size).has_value(), size == 0) << static_cast<int>(kind) << " " << size;
+    for (std::size_t cut = 0; cut < bytes.size(); cut += 3)
+      EXPECT_FALSE(decompress(kind, bytes.substr(0, cut), 300'000).has_value()) << cut;
+  }
+}
+
+// ---- topics ----
+
+TEST_F(ImportBag, ATopicOfTwoTypesIsReadByItsType) {
+  write("--two-types std_msgs/String");
+  const std::vector<BagTopic> topics = list_bag(bag());
+  ASSERT_EQ(topics.size(), 6U);
+  EXPECT_EQ(topics[1].name, topics[2].name);
+  EXPECT_EQ(topics[1].type, "sensor_msgs/Image");
+  EXPECT_EQ(topics[1].messages, 3U);
+  EXPECT_EQ(topics[2].type, "std_msgs/String");
+  EXPECT_EQ(topics[2].messages, 1U);
+  BagChoice choice;
+  for (const char* name : {"", "/cam0/image_raw"}) {
+    choice.image = name;
+    const Recording r = read_bag(bag(), choice);
+    EXPECT_EQ(r.images.size(), 3U);
+    EXPECT_TRUE(r.notices.empty()) << "the text is no damaged image";
+  }
+  write("--two-types sensor_msgs/CompressedImage");
+  choice.image = "/cam0/image_raw";
+  expect_all_in(complaint(choice), {"--image /cam0/image_raw", "sensor_msgs/Image and", "of one type"});
+}
+
 TEST_F(ImportBag, TopicsAreListedAndChosen) {
   write("--second-camera");
   const std::vector<BagTopic> topics = list_bag(bag());
@@ -134,10 +231,8 @@ TEST_F(ImportBag, TopicsAreListedAndChosen) {
 }
 
 TEST_F(ImportBag, SaysWhatItCannotRead) {
-  write("--compression lz4");
-  expect_all_in(complaint(), {"drive.bag: byte ", "compressed by lz4", "rosbag decompress"});
   write("--compression zip");
-  expect_all_in(complaint(), {"unknown compression"});
+  expect_all_in(complaint(), {"drive.bag: byte ", "unknown compression", "bz2 or lz4"});
   write("--encoding bayer_rggb8");
   expect_all_in(complaint(), {"encoding 'bayer_rggb8'", "mono8"});
   write("--no-info");
@@ -199,22 +294,136 @@ TEST_F(ImportBag, RectifiedImagesNeedACameraFile) {
   expect_all_in(complaint(), {"/cam0/image_rect", "rectified", "/cam0/camera_info", "--camera FILE"});
 }
 
+TEST_F(ImportBag, AnUnknownDistortionModelIsNamedWithTheKnownOnes) {
+  write("--model 'Kannala\\Brandt \"4\"'");
+  expect_all_in(complaint(), {"drive.bag, /cam0/camera_info:3:", "found 'Kannala?Brandt ?4?'", "'plumb_bob'",
+                              "'rational_polynomial'", "'equidistant'"});
+}
+
+// ---- two cameras, truth and wheels ----
+
+class ImportBagPair : public ImportBag {
+ protected:
+  ImportBagPair() {
+    choice_.image = "/cam0/image_raw";
+    choice_.second_image = "/cam1/image_raw";
+  }
+  BagChoice choice_;
+};
+
+TEST_F(ImportBagPair, ImagesOfTwoCamerasAreNumberedAsPairs) {
+  write("--stereo");
+  Recording r = read_bag(bag(), choice_);
+  ASSERT_EQ(r.images.size(), 6U);
+  EXPECT_EQ(r.missing_images, 0U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(r.images[i].camera, static_cast<int>(i % 2));
+    EXPECT_EQ(r.images[i].sequence, static_cast<std::int64_t>(i / 2));
+  }
+  EXPECT_EQ(r.images[3].utime, kStart + 52'000) << "each image keeps its own time";
+  const std::vector<image_t> right = images_of(r, "CAMERA_1");
+  ASSERT_EQ(right.size(), 3U);
+  EXPECT_EQ(right[1].data[64 * 5 + 7], 40 + 1 + 5 + 7);
+  keep_part(1, 1, "drive.bag", &r);
+  ASSERT_EQ(r.images.size(), 2U) << "a part is counted in pairs";
+  EXPECT_EQ(r.images[1].camera, 1);
+}
+
+TEST_F(ImportBagPair, ImagesFarApartAreNoPair) {
+  write("--stereo --late 5000000");
+  EXPECT_EQ(read_bag(bag(), choice_).missing_images, 0U);
+  write("--stereo --late 5001000");
+  const Recording r = read_bag(bag(), choice_);
+  EXPECT_EQ(r.missing_images, 6U);
+  EXPECT_EQ(r.images.back().sequence, 5);
+}
+
+TEST_F(ImportBagPair, TheSecondCamerasPlaceFollowsFromTheRectification) {
+  write("--stereo");
+  const Recording r = read_bag(bag(), choice_);
+  ASSERT_EQ(r.cameras.size(), 2U);
+  // 0.12 m to the right, which is the body's -y, and turned: its x axis points down.
+  EXPECT_TRUE(r.cameras[1].T_body_camera.t.isApprox(Eigen::Vector3d(0, -0.12, 0)));
+  EXPECT_TRUE((r.cameras[1].T_body_camera.q * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(0, 0, -1)));
+  EXPECT_TRUE(r.cameras[0].T_body_camera.t.isZero());
+}
+
+TEST_F(ImportBagPair, WithoutARelativePoseTheFilesAreAskedFor) {
+  write("--stereo --no-baseline");
+  expect_all_in(complaint(choice_), {"/cam1/camera_info has no rectification", "--second-camera"});
+  const std::string lens =
+      "model: pinhole-radtan\nwidth_px: 64\nheight_px: 48\nfx_px: 50\nfy_px: 51\ncx_px: 31\ncy_px: 23\n"
+      "distortion: []\n";
+  put(root_ / "left.yaml", lens);
+  put(root_ / "right.yaml", lens + "mount: {y_m: -0.3}\n");
+  choice_.camera_file = root_ / "left.yaml";
+  expect_all_in(complaint(choice_), {"--camera and --second-camera", "or neither"});
+  choice_.second_camera_file = root_ / "right.yaml";
+  expect_all_in(complaint(choice_), {"left.yaml: no T_body_camera", "both"});
+  put(root_ / "left.yaml", lens + "mount: {y_m: 0.1}\n");
+  const Recording r = read_bag(bag(), choice_);
+  EXPECT_EQ(r.cameras[0].T_body_camera.t.y(), 0.1);
+  EXPECT_EQ(r.cameras[1].T_body_camera.t.y(), -0.3);
+  choice_.second_image.clear();
+  expect_all_in(complaint(choice_), {"--second-camera", "with --second-image"});
+  choice_.second_image = choice_.image;
+  expect_all_in(complaint(choice_), {"is the first camera's topic"});
+}
+
+TEST_F(ImportBagPair, TruthComesFromPosesTransformsAndPoints) {
+  write("--stereo");
+  BagChoice choice;
+  choice.image = "/cam0/image_raw";
+  for (const char* topic : {"/pose", "/transform", "/point"}) {
+    choice.truth = topic;
+    const Recording r = read_bag(bag(), choice);
+    ASSERT_EQ(r.truth.size(), 3U) << topic;
+    EXPECT_EQ(r.truth[2].utime, kStart + 102'000);
+    EXPECT_EQ(r.truth[2].T_world_body.t, Eigen::Vector3d(3, 2, 3)) << topic;
+    EXPECT_EQ(r.truth_has_orientation, std::string(topic) != "/point");
+    if (r.truth_has_orientation) {
+      EXPECT_EQ(r.truth[2].T_world_body.q.z(), 1.0) << "half a turn about z";
+    }
+    ASSERT_EQ(r.notices.size(), 1U);
+    expect_all_in(r.notices[0], {topic, "is taken as the camera's place"});
+  }
+  choice.truth = "/odom";
+  EXPECT_EQ(read_bag(bag(), choice).truth.at(1).T_world_body.t, Eigen::Vector3d(1, 2, 3));
+  choice.truth = "/imu";
+  expect_all_in(complaint(choice), {"--truth /imu: of type sensor_msgs/Imu", "/odom", "/transform"});
+  choice.truth.clear();
+  choice.wheels = "/twist";
+  const Recording r = read_bag(bag(), choice);
+  ASSERT_EQ(r.wheels.size(), 3U);
+  EXPECT_EQ(r.wheels[1].speed_mps, 2.5);
+  EXPECT_TRUE(r.truth.empty());
+}
+
+TEST_F(ImportBagPair, ATruthThatIsNoRotationIsDamage) {
+  write("--stereo");
+  std::string whole = get(bag());
+  // The quaternion 0 0 1 0 of the first pose, behind its position.
+  const std::string position = std::string("\0\0\0\0\0\0\0\x40\0\0\0\0\0\0\x08\x40", 16);
+  const std::size_t at = whole.find(position + std::string(16, '\0'), whole.rfind("conn=", whole.find("map")));
+  ASSERT_NE(at, std::string::npos);
+  whole[at + 16 + 23] = '\x40';
+  put(bag(), whole);
+  choice_.truth = "/pose";
+  const Recording r = read_bag(bag(), choice_);
+  EXPECT_EQ(r.truth.size(), 2U);
+  expect_all_in(r.notices.at(0), {"1 damaged messages"});
+}
+
 TEST_F(ImportBag, DamagedBytesNeverCrash) {
-  write("--encoding rgb8");
-  const std::string whole = get(bag());
   std::mt19937 random(5);
   int read = 0;
-  for (int round = 0; round < 150; ++round) {
-    std::string damaged = whole;
-    for (int i = 0; i < 3; ++i)
-      damaged[random() % (round % 2 == 0 ? 4000 : damaged.size())] = static_cast<char>(random());
-    put(bag(), damaged);
-    try {
-      write_recording(read_bag(bag(), {}), root_ / "run.lcm");
-      ++read;
-    } catch (const std::exception& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    }
+  for (const char* options : {"--encoding rgb8", "--stereo --split --compression lz4"}) {
+    write(options);
+    const std::string whole = get(bag());
+    BagChoice choice;
+    choice.image = "/cam0/image_raw";
+    if (std::string(options).starts_with("--stereo")) choice.second_image = "/cam1/image_raw";
+    read += read_damaged(whole, choice, &random);
   }
   EXPECT_GT(read, 20);
 }

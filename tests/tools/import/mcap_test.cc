@@ -58,16 +58,30 @@ TEST_F(ImportMcap, ReadsImagesCalibrationImuAndWheels) {
 }
 
 TEST_F(ImportMcap, PixelsAreThoseOfTheMessage) {
-  write("--chunks");
-  write_recording(read_bag(file(), {}), root_ / "run.lcm");
-  std::size_t images = 0;
-  for (const image_t& image : test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0")) {
-    ASSERT_EQ(image.size, 64 * 48);
-    for (std::size_t i = 0; i < image.data.size(); ++i)
-      ASSERT_EQ(image.data[i], (i % 64 + i / 64 + images) % 256) << i;
-    ++images;
+  for (const char* options : {"", "--chunks", "--compression lz4", "--compression zstd",
+                              "--compression lz4 --split", "--compression zstd --split"}) {
+    write(options);
+    write_recording(read_bag(file(), {}), root_ / "run.lcm");
+    std::size_t images = 0;
+    for (const image_t& image : test::messages_of<image_t>((root_ / "run.lcm").string(), "CAMERA_0")) {
+      ASSERT_EQ(image.size, 64 * 48);
+      for (std::size_t i = 0; i < image.data.size(); ++i)
+        ASSERT_EQ(image.data[i], (i % 64 + i / 64 + images) % 256) << options << " " << i;
+      ++images;
+    }
+    EXPECT_EQ(images, 3U) << options;
   }
-  EXPECT_EQ(images, 3U);
+}
+
+TEST_F(ImportMcap, AChunkOfAnotherSizeThanItDeclaresIsRefused) {
+  for (const std::string compression : {"lz4", "zstd"}) {
+    for (const char* size : {"1", "1000", "30000"}) {
+      write("--compression " + compression + " --size " + size);
+      expect_all_in(complaint(), {"drive.mcap: byte ", "a damaged chunk", std::string(size) + " bytes"});
+    }
+    write("--compression " + compression + " --size 1000000000000000000");
+    expect_all_in(complaint(), {"a chunk of 1000000000000000000 bytes, expected at most 128 MiB"});
+  }
 }
 
 TEST_F(ImportMcap, TopicsHaveTheNamesOfTheirTypesAndEncodings) {
@@ -80,8 +94,8 @@ TEST_F(ImportMcap, TopicsHaveTheNamesOfTheirTypesAndEncodings) {
 }
 
 TEST_F(ImportMcap, SaysWhatItCannotRead) {
-  write("--compression zstd");
-  expect_all_in(complaint(), {"drive.mcap: byte ", "compressed by zstd", "mcap decompress"});
+  write("--compression brotli");
+  expect_all_in(complaint(), {"drive.mcap: byte ", "unknown compression", "lz4 or zstd"});
   write("--open");
   expect_all_in(complaint(), {"cut off", "mcap recover"});
   write();
@@ -98,7 +112,7 @@ TEST_F(ImportMcap, SaysWhatItCannotRead) {
 TEST_F(ImportMcap, DamagedBytesNeverCrash) {
   std::mt19937 random(6);
   int read = 0;
-  for (const char* options : {"", "--chunks"}) {
+  for (const char* options : {"", "--chunks", "--compression zstd --split"}) {
     write(options);
     const std::string whole = get(file());
     for (int round = 0; round < 150; ++round) {

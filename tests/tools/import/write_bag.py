@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes a small ROS 1 bag (format 2.0, one chunk, with index) by the format's description, standard library only.
 
-usage: write_bag.py OUT.bag [--compression NAME] [--unindexed] [--no-info] [--encoding NAME] [--second-camera]
+usage: write_bag.py OUT.bag [--compression NAME] [--unindexed] [--no-info] [--encoding NAME] [--second-camera] ...
 
 Images /cam0/image_raw (64x48, 3 of them, 50 ms apart), /cam0/image_raw/compressed where --jpeg FILE is given, camera_info,
-/imu (10), /odom (4) and a topic of another type.
+/imu (10), /odom (4) and a topic of another type. Compression by Python's bz2 and the program lz4.
 """
 
 import argparse
+import bz2
 import struct
+import subprocess
 
 SECONDS = 1_600_000_000
 
@@ -49,11 +51,11 @@ def image(sequence, nanoseconds, encoding):
             struct.pack("<I", len(rows[0])) + struct.pack("<I", len(data)) + data)
 
 
-def camera_info():
+def camera_info(model="plumb_bob", r=(1, 0, 0, 0, 1, 0, 0, 0, 1), baseline=0.0):
     numbers = [50.0, 0, 31, 0, 51, 23, 0, 0, 1]
-    return (header(0, 0) + struct.pack("<II", 48, 64) + text("plumb_bob") + struct.pack("<I", 5) +
+    return (header(0, 0) + struct.pack("<II", 48, 64) + text(model) + struct.pack("<I", 5) +
             struct.pack("<5d", -0.1, 0.01, 0.002, -0.003, 0.0004) + struct.pack("<9d", *numbers) +
-            struct.pack("<9d", 1, 0, 0, 0, 1, 0, 0, 0, 1) + struct.pack("<12d", 70, 0, 32, 0, 0, 71, 24, 0, 0, 0, 1, 0) +
+            struct.pack("<9d", *r) + struct.pack("<12d", 70, 0, 32, -70 * baseline, 0, 71, 24, 0, 0, 0, 1, 0) +
             struct.pack("<II", 0, 0) + struct.pack("<IIIIB", 0, 0, 0, 0, 0))
 
 
@@ -67,6 +69,37 @@ def odometry(sequence, nanoseconds):
     return (header(sequence, nanoseconds, "odom") + text("base_link") + struct.pack("<7d", 1, 2, 3, 0, 0, 0, 1) +
             struct.pack("<36d", *[0] * 36) + struct.pack("<6d", 1.5 + sequence, 0, 0, 0, 0, 0.25) +
             struct.pack("<36d", *[0] * 36))
+
+
+def pose(sequence, nanoseconds):
+    """geometry_msgs/PoseStamped: half a turn about z."""
+    return header(sequence, nanoseconds, "map") + struct.pack("<7d", 1 + sequence, 2, 3, 0, 0, 1, 0)
+
+
+def transform(sequence, nanoseconds):
+    return header(sequence, nanoseconds, "map") + text("body") + struct.pack("<7d", 1 + sequence, 2, 3, 0, 0, 1, 0)
+
+
+def point(sequence, nanoseconds):
+    return header(sequence, nanoseconds, "map") + struct.pack("<3d", 1 + sequence, 2, 3)
+
+
+def twist(sequence, nanoseconds):
+    return header(sequence, nanoseconds, "base") + struct.pack("<6d", 1.5 + sequence, 0, 0, 0, 0, 0.25)
+
+
+def compressed(name, data):
+    if name == "bz2":
+        return bz2.compress(data)
+    if name == "lz4":
+        return subprocess.run(["lz4", "-q", "-c"], input=data, stdout=subprocess.PIPE, check=True).stdout
+    return data
+
+
+def chunk_record(options, data):
+    size = len(data) if options.size is None else options.size
+    return record({"op": b"\x05", "compression": options.compression.encode(), "size": struct.pack("<I", size)},
+                  compressed(options.compression, data))
 
 
 def connection(number, topic, kind):
@@ -90,6 +123,13 @@ def main():
     parser.add_argument("--second-camera", action="store_true")
     parser.add_argument("--jpeg")
     parser.add_argument("--image-name", default="/cam0/image_raw")
+    parser.add_argument("--size", type=int, help="size that the chunks declare instead of their own")
+    parser.add_argument("--split", action="store_true", help="a chunk for each message")
+    parser.add_argument("--model", default="plumb_bob", help="distortion_model of camera_info")
+    parser.add_argument("--two-types", help="a second type of the image topic, as text")
+    parser.add_argument("--stereo", action="store_true", help="a pair with the right camera 0.12 m beside the left")
+    parser.add_argument("--no-baseline", action="store_true", help="with --stereo: calibrated one by one")
+    parser.add_argument("--late", type=int, default=2_000_000, help="with --stereo: ns after the left image")
     options = parser.parse_args()
 
     topics = [(options.image_name, "sensor_msgs/Image"), ("/imu", "sensor_msgs/Imu"), ("/odom", "nav_msgs/Odometry"),
@@ -98,19 +138,27 @@ def main():
         topics.append(("/cam0/camera_info", "sensor_msgs/CameraInfo"))
     if options.jpeg:
         topics[0] = ("/cam0/image_raw/compressed", "sensor_msgs/CompressedImage")
-    if options.second_camera:
+    if options.second_camera or options.stereo:
         topics.append(("/cam1/image_raw", "sensor_msgs/Image"))
-    number = {topic: i for i, (topic, _) in enumerate(topics)}
+    if options.stereo:
+        topics += [("/cam1/camera_info", "sensor_msgs/CameraInfo"), ("/pose", "geometry_msgs/PoseStamped"),
+                   ("/transform", "geometry_msgs/TransformStamped"), ("/point", "geometry_msgs/PointStamped"),
+                   ("/twist", "geometry_msgs/TwistWithCovarianceStamped")]
+    if options.two_types:
+        topics.append((options.image_name, options.two_types))
+    number = {topic: i for i, (topic, _) in reversed(list(enumerate(topics)))}
     connections = b"".join(connection(i, topic, kind) for i, (topic, kind) in enumerate(topics))
 
-    chunk = connections
+    messages = []
     if not options.no_info:
-        chunk += message(number["/cam0/camera_info"], 0, camera_info())
-    chunk += message(number["/chatter"], 0, text("hello"))
+        messages.append(message(number["/cam0/camera_info"], 0, camera_info(options.model)))
+    messages.append(message(number["/chatter"], 0, text("hello")))
+    if options.two_types:
+        messages.append(message(len(topics) - 1, 0, text("is no image")))
     for i in range(10):
-        chunk += message(number["/imu"], 10_000_000 * i + 5, imu(i, 10_000_000 * i))
+        messages.append(message(number["/imu"], 10_000_000 * i + 5, imu(i, 10_000_000 * i)))
     for i in range(4):
-        chunk += message(number["/odom"], 30_000_000 * i + 5, odometry(i, 30_000_000 * i))
+        messages.append(message(number["/odom"], 30_000_000 * i + 5, odometry(i, 30_000_000 * i)))
     for i in range(3):
         when = 50_000_000 * i
         if options.jpeg:
@@ -119,12 +167,23 @@ def main():
             data = header(i, when) + text("jpeg") + struct.pack("<I", len(content)) + content
         else:
             data = image(i, when, options.encoding)
-        chunk += message(0, when + 1_000_000, data)
+        messages.append(message(0, when + 1_000_000, data))
     if options.second_camera:
-        chunk += message(number["/cam1/image_raw"], 0, image(0, 0, "mono8"))
+        messages.append(message(number["/cam1/image_raw"], 0, image(0, 0, "mono8")))
+    if options.stereo:
+        # Turned by 90 degrees about the optical axis, so that order and direction of the turns count.
+        info = camera_info(r=(0, -1, 0, 1, 0, 0, 0, 0, 1), baseline=0.0 if options.no_baseline else 0.12)
+        messages.append(message(number["/cam1/camera_info"], 0, info))
+        for i in range(3):
+            when = 50_000_000 * i + options.late
+            messages.append(message(number["/cam1/image_raw"], when, image(40 + i, when, "mono8")))
+            for name, pack in (("/pose", pose), ("/transform", transform), ("/point", point), ("/twist", twist)):
+                messages.append(message(number[name], when, pack(i, when)))
 
-    body = record({"op": b"\x05", "compression": options.compression.encode(), "size": struct.pack("<I", len(chunk))},
-                  chunk)
+    if options.split:
+        body = chunk_record(options, connections) + b"".join(chunk_record(options, m) for m in messages)
+    else:
+        body = chunk_record(options, connections + b"".join(messages))
     if not options.unindexed:
         body += record({"op": b"\x04", "ver": struct.pack("<I", 1), "conn": struct.pack("<I", 1),
                         "count": struct.pack("<I", 1)}, stamp(0) + struct.pack("<I", 0))

@@ -4,11 +4,13 @@
 
 usage: write_mcap.py OUT.mcap [--compression NAME] [--chunks] [--open]
 
-Images /cam0/image_raw (64x48, 3 of them, 50 ms apart), camera_info, /imu (10), /odom (4), and a topic of JSON.
+Images /cam0/image_raw (64x48, 3 of them, 50 ms apart), camera_info, /imu (10), /odom (4), and a topic of JSON. Compression
+by the programs lz4 and zstd.
 """
 
 import argparse
 import struct
+import subprocess
 
 SECONDS = 1_600_000_000
 
@@ -81,25 +83,41 @@ def message(number, nanoseconds, data):
     return record(5, struct.pack("<HIQQ", number, 0, when, when) + data)
 
 
+def compressed(name, data):
+    if name in ("lz4", "zstd"):
+        return subprocess.run([name, "-q", "-c"], input=data, stdout=subprocess.PIPE, check=True).stdout
+    return data
+
+
+def chunk(options, data):
+    size = len(data) if options.size is None else options.size
+    packed = compressed(options.compression, data)
+    return record(6, struct.pack("<QQQI", 0, 0, size, 0) + text(options.compression) + struct.pack("<Q", len(packed)) + packed)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out")
     parser.add_argument("--compression", default="")
     parser.add_argument("--chunks", action="store_true")
     parser.add_argument("--open", action="store_true", help="as a recorder that was killed leaves it")
+    parser.add_argument("--size", type=int, help="size that the chunks declare instead of their own")
+    parser.add_argument("--split", action="store_true", help="a chunk for each message")
     options = parser.parse_args()
 
     topics = [("/cam0/image_raw", "sensor_msgs/msg/Image"), ("/imu", "sensor_msgs/msg/Imu"),
               ("/odom", "nav_msgs/msg/Odometry"), ("/cam0/camera_info", "sensor_msgs/msg/CameraInfo")]
     channels = b"".join(channel(i, topic, kind) for i, (topic, kind) in enumerate(topics))
     channels += channel(9, "/notes", "sensor_msgs/msg/Image", "json")
-    records = channels + message(3, 0, camera_info()) + message(9, 0, b"{}")
-    records += b"".join(message(1, 10_000_000 * i + 5, imu(i, 10_000_000 * i)) for i in range(10))
-    records += b"".join(message(2, 30_000_000 * i + 5, odometry(i, 30_000_000 * i)) for i in range(4))
-    records += b"".join(message(0, 50_000_000 * i + 1_000_000, image(i, 50_000_000 * i)) for i in range(3))
-    if options.chunks or options.compression:
-        records = record(6, struct.pack("<QQQI", 0, 0, len(records), 0) + text(options.compression) +
-                         struct.pack("<Q", len(records)) + records)
+    messages = [message(3, 0, camera_info()), message(9, 0, b"{}")]
+    messages += [message(1, 10_000_000 * i + 5, imu(i, 10_000_000 * i)) for i in range(10)]
+    messages += [message(2, 30_000_000 * i + 5, odometry(i, 30_000_000 * i)) for i in range(4)]
+    messages += [message(0, 50_000_000 * i + 1_000_000, image(i, 50_000_000 * i)) for i in range(3)]
+    records = channels + b"".join(messages)
+    if options.split:
+        records = chunk(options, channels) + b"".join(chunk(options, m) for m in messages)
+    elif options.chunks or options.compression:
+        records = chunk(options, records)
     body = b"\x89MCAP0\r\n" + record(1, text("ros2") + text("by hand")) + records
     if not options.open:
         body += record(15, struct.pack("<I", 0)) + channels + record(2, struct.pack("<QQI", 0, 0, 0)) + b"\x89MCAP0\r\n"
@@ -107,4 +125,5 @@ def main():
         file.write(body)
 
 
-main()
+if __name__ == "__main__":
+    main()

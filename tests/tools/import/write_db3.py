@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Writes a small bag of ROS 2 as rosbag2 stores it in SQLite (CDR messages), by Python's sqlite3.
+
+usage: write_db3.py OUT.db3 [--sql TEXT] [--from N] [--to N]
+
+The topics of write_mcap.py. --sql is run at the end; --from and --to choose images, for a bag in several files.
+"""
+
+import argparse
+import os
+import sqlite3
+
+from write_mcap import SECONDS, camera_info, image, imu, odometry
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out")
+    parser.add_argument("--sql", default="")
+    parser.add_argument("--from", dest="first", type=int, default=0)
+    parser.add_argument("--to", type=int, default=3)
+    options = parser.parse_args()
+
+    if os.path.exists(options.out):
+        os.remove(options.out)
+    database = sqlite3.connect(options.out)
+    database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+                     "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
+    database.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
+                     "data BLOB NOT NULL)")
+    database.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
+    topics = [("/cam0/image_raw", "sensor_msgs/msg/Image", "cdr"), ("/imu", "sensor_msgs/msg/Imu", "cdr"),
+              ("/odom", "nav_msgs/msg/Odometry", "cdr"), ("/cam0/camera_info", "sensor_msgs/msg/CameraInfo", "cdr"),
+              ("/notes", "sensor_msgs/msg/Image", "json")]
+    for number, (name, kind, encoding) in enumerate(topics, 1):
+        database.execute("INSERT INTO topics VALUES (?, ?, ?, ?, '')", (number, name, kind, encoding))
+
+    def put(topic, nanoseconds, data):
+        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)",
+                         (topic, SECONDS * 10**9 + nanoseconds, data))
+
+    put(4, 0, camera_info())
+    put(5, 0, b"{}")
+    for i in range(10):
+        put(2, 10_000_000 * i + 5, imu(i, 10_000_000 * i))
+    for i in range(4):
+        put(3, 30_000_000 * i + 5, odometry(i, 30_000_000 * i))
+    for i in range(options.first, options.to):
+        put(1, 50_000_000 * i + 1_000_000, image(i, 50_000_000 * i))
+    database.executescript(options.sql)
+    database.commit()
+    database.close()
+
+
+main()
