@@ -7,7 +7,7 @@ file(GLOB_RECURSE fuzzed CONFIGURE_DEPENDS
      ${CMAKE_SOURCE_DIR}/daemon/config/*.cc ${CMAKE_SOURCE_DIR}/tools/common/*.cc ${CMAKE_SOURCE_DIR}/tools/evaluate/*.cc
      ${CMAKE_SOURCE_DIR}/tools/report/*.cc ${CMAKE_SOURCE_DIR}/tools/trajectory/*.cc ${CMAKE_CURRENT_LIST_DIR}/*.cc)
 list(FILTER fuzzed EXCLUDE REGEX "(_main|_test|/daemon/config/(options|build_info))[.]cc$")
-foreach(reader bag byte_file images mcap recording ros_bag ros_message)
+foreach(reader bag bag_file bag_topics byte_file chunk images mcap recording recording_log ros_bag ros_message sqlite_bag)
   list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/tools/import/${reader}.cc)
 endforeach()
 list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/daemon/system/control_socket.cc ${CMAKE_SOURCE_DIR}/daemon/system/service_log.cc
@@ -26,7 +26,8 @@ target_include_directories(farpoint_fuzz_base INTERFACE ${CMAKE_SOURCE_DIR})
 target_include_directories(farpoint_fuzz_base SYSTEM INTERFACE
                            $<TARGET_PROPERTY:farpoint_ipc,INTERFACE_SYSTEM_INCLUDE_DIRECTORIES>)
 target_link_libraries(farpoint_fuzz_base INTERFACE farpoint_test_paths Eigen3::Eigen Lcm::lcm PNG::PNG JPEG::JPEG
-                      ZLIB::ZLIB spdlog::spdlog yaml-cpp hwy::hwy Threads::Threads)
+                      ZLIB::ZLIB spdlog::spdlog yaml-cpp hwy::hwy Threads::Threads BZip2::BZip2 Lz4::lz4
+                      zstd::libzstd_shared SQLite::SQLite3)
 add_library(farpoint_beside_fuzzed STATIC EXCLUDE_FROM_ALL ${beside})
 target_compile_options(farpoint_beside_fuzzed PRIVATE -O2)
 add_library(farpoint_fuzzed STATIC EXCLUDE_FROM_ALL ${fuzzed})

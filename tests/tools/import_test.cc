@@ -158,7 +158,7 @@ TEST_P(KittiDamage, IsNamed) {
   const ScratchFolder root;
   make_kitti(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07"); }), GetParam().complaint);
+  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); }), GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -215,10 +215,10 @@ TEST(ImportKitti, DamagedGpsIsNamed) {
   make_kitti(root.path());
   fs::remove(root / "poses/07.txt");
   put(root / "sequences/07/gps_xy.txt", "0 1 2\n0.1 1\n");
-  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07"); }),
+  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); }),
                 {"gps_xy.txt:2:", "seconds east north"});
   put(root / "sequences/07/gps_xy.txt", "0 1 2\n0 1 2\n");
-  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07"); }),
+  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); }),
                 {"gps_xy.txt:2:", "after the one above"});
 }
 
@@ -276,7 +276,7 @@ TEST_P(EurocDamage, IsNamed) {
   const ScratchFolder root;
   make_euroc(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_euroc(root.path()); }), GetParam().complaint);
+  expect_all_in(complaint_of([&] { (void)read_euroc(root.path(), Damaged::kRefused); }), GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -377,7 +377,7 @@ TEST_P(TumDamage, IsNamed) {
   const ScratchFolder root;
   make_tum(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_tum_rgbd(root.path(), root / "camera.yaml"); }),
+  expect_all_in(complaint_of([&] { (void)read_tum_rgbd(root.path(), root / "camera.yaml", Damaged::kRefused); }),
                 GetParam().complaint);
 }
 
@@ -402,6 +402,90 @@ INSTANTIATE_TEST_SUITE_P(
                            {"groundtruth.txt:2:", "unit quaternion"}},
                     Damage{"NoCameraFile", removing("camera.yaml"), {"camera.yaml", "cannot be opened"}}),
     name_of);
+
+// ---- sensors beside the images ----
+
+// One notice that holds the parts.
+void expect_left_out(const Recording& recording, const std::vector<std::string>& parts) {
+  ASSERT_EQ(recording.notices.size(), 1U);
+  expect_all_in(recording.notices[0], parts);
+  expect_all_in(recording.notices[0], {"imported without this sensor"});
+}
+
+TEST(ImportDamagedSensor, KittiIsImportedWithoutItsTruth) {
+  const ScratchFolder root;
+  make_kitti(root.path());
+  put(root / "poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 2 3\n");
+  const Recording poses = read_kitti(root.path(), "07");
+  EXPECT_EQ(poses.images.size(), 10U);
+  EXPECT_TRUE(poses.truth.empty());
+  expect_left_out(poses, {"07.txt:2:", "expected 12 fields"});
+  fs::remove(root / "poses/07.txt");
+  put(root / "sequences/07/gps_xy.txt", "0 1 2\n0.1 1\n");
+  expect_left_out(read_kitti(root.path(), "07"), {"gps_xy.txt:2:"});
+}
+
+TEST(ImportDamagedSensor, EurocIsImportedWithoutItsImuOrTruth) {
+  const ScratchFolder root;
+  make_euroc(root.path());
+  replace_in(root / "mav0/imu0/data.csv", "9.8", "nan");
+  const Recording imu = read_euroc(root.path());
+  EXPECT_EQ(imu.images.size(), 9U);
+  EXPECT_TRUE(imu.imu.empty());
+  EXPECT_FALSE(imu.imu_calibration.has_value()) << "a calibration without samples";
+  EXPECT_EQ(imu.truth.size(), 5U);
+  expect_left_out(imu, {"imu0/data.csv:2:", "acceleration"});
+  fs::remove_all(root / "mav0/imu0");
+  put(root / "mav0/state_groundtruth_estimate0/data.csv", "1,2,3\n");
+  expect_left_out(read_euroc(root.path()), {"state_groundtruth_estimate0/data.csv:1:"});
+}
+
+TEST(ImportDamagedSensor, TumIsImportedWithoutItsTruth) {
+  const ScratchFolder root;
+  make_tum(root.path());
+  replace_in(root / "groundtruth.txt", " 0.6 0 0 0.8", "");
+  const Recording r = read_tum_rgbd(root.path(), root / "camera.yaml");
+  EXPECT_EQ(r.images.size(), 5U);
+  EXPECT_TRUE(r.truth.empty());
+  expect_left_out(r, {"groundtruth.txt:2:"});
+}
+
+TEST(ImportDamagedSensor, TheProgramWarnsAndStrictRefuses) {
+  const ScratchFolder root;
+  make_euroc(root.path());
+  replace_in(root / "mav0/imu0/data.csv", "9.8", "nan");
+  const std::string command =
+      "import euroc '" + root.path().string() + "' -o '" + (root / "x.lcm").string() + "'";
+  const ProgramResult strict = run_farpoint_program(command + " --strict");
+  EXPECT_EQ(strict.status, 2);
+  EXPECT_FALSE(fs::exists(root / "x.lcm"));
+  const ProgramResult done = run_farpoint_program(command);
+  EXPECT_EQ(done.status, 0);
+  EXPECT_NE(done.err.find("imu0/data.csv:2:"), std::string::npos) << done.err;
+  EXPECT_NE(done.out.find("0 IMU samples, 5 truth poses"), std::string::npos) << done.out;
+}
+
+// ---- stamps ----
+
+TEST(ImportStamps, DatesInNanosecondsAreUnderstoodWhereSecondsAreUsual) {
+  const ScratchFolder root;
+  make_tum(root.path());
+  std::string list, truth;
+  for (int i = 0; i < 5; ++i) {
+    list += std::to_string(1305031229528748501 + 33'000'000LL * i) + " rgb/1305031229." +
+            std::to_string(528748 + 33000 * i) + ".jpg\n";
+    truth += std::to_string(1305031229528748499 + 33'000'000LL * i) + " 1 2 3 0 0 0 1\n";
+  }
+  put(root / "rgb.txt", list);
+  put(root / "groundtruth.txt", truth);
+  const Recording r = read_tum_rgbd(root.path(), root / "camera.yaml");
+  ASSERT_EQ(r.images.size(), 5U);
+  EXPECT_EQ(r.images[1].utime, 1305031229561749) << "rounded to the nearest";
+  EXPECT_EQ(r.truth.at(1).utime, 1305031229561748);
+  replace_in(root / "rgb.txt", "1305031229528748501", "13050312295287");
+  expect_all_in(complaint_of([&] { (void)read_tum_rgbd(root.path(), root / "camera.yaml"); }),
+                {"rgb.txt:1:", "0 to 9e9 seconds"});
+}
 
 // ---- camera files ----
 

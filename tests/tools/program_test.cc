@@ -104,6 +104,15 @@ TEST(Program, FilesOfAWrongKindAreNamedForWhatTheyAre) {
   }
 }
 
+TEST(Program, TheFolderOfPicturesIsMade) {
+  const ScratchFolder folder;
+  const std::string simulate = "simulate yard --size 64x48 --duration 0.2 -o " + quoted(folder / "x.lcm");
+  const fs::path pictures = folder / "new/pictures";
+  EXPECT_EQ(run_farpoint_program(simulate + " --every 1 --pictures " + quoted(pictures)).status, 0);
+  EXPECT_FALSE(fs::is_empty(pictures));
+  expect_misuse(simulate + " --pictures " + quoted(folder / "x.lcm"), "x.lcm: cannot be made");
+}
+
 TEST(Program, ImportsExportsAndEvaluates) {
   const ScratchFolder folder;
   make_euroc(folder.path());

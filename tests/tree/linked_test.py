@@ -23,6 +23,8 @@ DAEMON = SYSTEM | LCM | SYSTEMD | {"hwy", "png16", "jpeg", "z", "spdlog", "fmt",
 OPENCV = {"opencv_core", "opencv_features2d", "opencv_flann", "opencv_imgproc", "tbb", "GLX", "GLdispatch", "X11", "xcb",
           "Xau", "Xdmcp", "bsd", "md", "lapack", "blas", "f77blas", "cblas", "atlas", "openblas", "openblasp", "gfortran",
           "quadmath", "gomp"}
+# Chunks of ROS bags, and bags in SQLite.
+BAGS = {"bz2", "lz4", "zstd", "sqlite3"}
 LIBCAMERA = {"camera", "camera-base", "gnutls", "udev", "yaml-0", "p11-kit", "idn2", "unistring", "tasn1", "nettle",
              "hogweed", "gmp", "ffi", "lttng-ust", "lttng-ust-common", "lttng-ust-tracepoint", "numa",
              "boost_filesystem", "dw", "elf", "bz2", "unwind"}
@@ -38,7 +40,7 @@ GPL = {"cholmod": "Ceres", "spqr": "Ceres", "umfpack": "SuiteSparse", "gdal": "o
 # File in the build folder: what it may load, what of that may be GPL, whether it must be there.
 FILES = {
     "bin/farpointd": (DAEMON, set(), True),
-    "bin/farpoint": (DAEMON | OPENCV, set(), True),
+    "bin/farpoint": (DAEMON | OPENCV | BAGS, set(), True),
     "lib/farpoint/farpoint_libcamera.so": (DAEMON | LIBCAMERA, set(), False),
     "lib/farpoint/farpoint_ceres.so": (SYSTEM | LCM | CERES | {"lzma", "z"}, {"cholmod", "spqr"}, True),
 }

@@ -23,7 +23,9 @@ struct ImportOptions {
   std::int64_t first = 0, frames = 0;
   PictureTimes times;
   BagChoice bag;
-  bool list = false;
+  bool list = false, strict = false;
+
+  [[nodiscard]] Damaged damaged() const { return strict ? Damaged::kRefused : Damaged::kLeftOut; }
 };
 
 void print_summary(const Recording& recording, const std::string& output) {
@@ -59,6 +61,12 @@ CLI::App* add_layout(CLI::App* import, const char* name, const char* description
   layout->add_option("-o,--output", options->output, "LCM log to write; an existing one is replaced")
       ->required();
   return add_part(layout, options);
+}
+
+// Of the layouts with sensors beside the images.
+void add_strict(CLI::App* layout, ImportOptions* options) {
+  layout->add_flag("--strict", options->strict,
+                   "Refuse a damaged file of IMU or truth (default: warn, and import without that sensor)");
 }
 
 int import_images(const ImportOptions& options) {
@@ -205,29 +213,32 @@ void add_import_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<ImportOptions>();
   CLI::App* kitti = add_layout(import, "kitti", "KITTI odometry: DIR/sequences/SEQUENCE", options.get());
   kitti->add_option("SEQUENCE", options->sequence, "Name of the sequence, like 03")->required();
+  add_strict(kitti, options.get());
   kitti->footer(
       "Reads calib.txt, times.txt (absent: 0.1 s apart), image_0, image_1 where there is one, and truth "
       "from\n"
       "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').");
   kitti->callback([=] {
-    *action = [=] { return write_and_report(read_kitti(options->folder, options->sequence), *options); };
+    *action = [=] { return write_and_report(read_kitti(options->folder, options->sequence, options->damaged()), *options); };
   });
 
   CLI::App* euroc = add_layout(import, "euroc", "EuRoC (ASL): DIR holds mav0, or is it", options.get());
+  add_strict(euroc, options.get());
   euroc->footer(
       "Reads cam0, cam1 and imu0 where there are any, and state_groundtruth_estimate0. Images missing on one "
       "side are\n"
       "counted and left out.");
-  euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder), *options); }; });
+  euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder, options->damaged()), *options); }; });
 
   CLI::App* tum = add_layout(import, "tum", "TUM RGB-D: DIR holds rgb.txt", options.get());
   tum->add_option("--camera", options->camera_file,
                   "Camera file (config/cameras), or a calibration of ROS, Kalibr or OpenCV")
       ->required();
+  add_strict(tum, options.get());
   tum->footer("Reads rgb.txt and groundtruth.txt where there is one. Depth is not read.");
   tum->callback([=] {
     *action = [=] {
-      return write_and_report(read_tum_rgbd(options->folder, options->camera_file), *options);
+      return write_and_report(read_tum_rgbd(options->folder, options->camera_file, options->damaged()), *options);
     };
   });
 

@@ -71,8 +71,11 @@ int record_simulation(const SimulateOptions& options) {
   recorder.output = options.output;
   recorder.format = options.format == "mjpeg" ? simulate::ImageFormat::kMjpeg : simulate::ImageFormat::kGrey;
   if (!options.pictures.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(options.pictures, error);
     if (!std::filesystem::is_directory(options.pictures))
-      throw InputError("--pictures " + options.pictures + ": expected a folder");
+      throw InputError("--pictures " + options.pictures + ": cannot be made (" + error.message() +
+                       "), expected a folder");
     recorder.picture_folder = options.pictures;
     recorder.picture_every = options.every;
   }
@@ -161,7 +164,7 @@ void add_simulate_command(CLI::App* app, Action* action) {
   command->add_option("--format", options->format, "Of the images: grey (default) or mjpeg")
       ->check(CLI::IsMember({"grey", "mjpeg"}));
   CLI::Option* pictures =
-      command->add_option("--pictures", options->pictures, "Folder for some images as PNG files");
+      command->add_option("--pictures", options->pictures, "Folder for some images as PNG files; it is made");
   command->add_option("--every", options->every, "With --pictures: one picture every N frames (default 50)")
       ->needs(pictures)
       ->check(CLI::Range(1, 1000000));

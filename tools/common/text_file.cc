@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "ipc/output_file.h"
 #include "tools/common/errors.h"
@@ -18,6 +19,20 @@ namespace {
 
 // Beyond this a time in microseconds does not fit 53 bits any more; no clock of a data set gets there.
 constexpr double kMaxSeconds = 9e9;
+
+// Rounded to microseconds.
+std::int64_t microseconds_of(std::int64_t nanoseconds) {
+  return nanoseconds / 1000 + (nanoseconds % 1000 >= 500 ? 1 : 0);
+}
+
+// Microseconds of a stamp that is a date in nanoseconds: of 1973 on. As seconds it would be beyond any clock.
+std::optional<std::int64_t> date_in_nanoseconds(std::string_view text) {
+  constexpr std::int64_t kFirst_ns = 100'000'000'000'000'000;
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < kFirst_ns) return {};
+  return microseconds_of(value);
+}
 
 }  // namespace
 
@@ -67,7 +82,13 @@ std::int64_t FieldLine::integer_at(std::size_t i, std::string_view what) const {
   return value;
 }
 
+double FieldLine::seconds_at(std::size_t i, std::string_view what) const {
+  const std::optional<std::int64_t> utime = date_in_nanoseconds(text(i));
+  return utime ? static_cast<double>(*utime) * 1e-6 : number_at(i, what);
+}
+
 std::int64_t FieldLine::utime_from_seconds_at(std::size_t i, std::string_view what) const {
+  if (const std::optional<std::int64_t> utime = date_in_nanoseconds(text(i))) return *utime;
   const double seconds = number_at(i, what);
   if (seconds < 0.0 || seconds > kMaxSeconds) {
     fail("expected " + std::string(what) + " of 0 to 9e9 seconds, found '" + std::string(text(i)) + "'");
@@ -79,7 +100,7 @@ std::int64_t FieldLine::utime_from_nanoseconds_at(std::size_t i, std::string_vie
   const std::int64_t nanoseconds = integer_at(i, what);
   if (nanoseconds < 0)
     fail("expected " + std::string(what) + " >= 0 ns, found '" + std::string(text(i)) + "'");
-  return nanoseconds / 1000 + (nanoseconds % 1000 >= 500 ? 1 : 0);
+  return microseconds_of(nanoseconds);
 }
 
 FieldFile::FieldFile(std::filesystem::path file, std::string_view separators) : path_(std::move(file)) {

@@ -156,7 +156,7 @@ fs::path find_mav0(const fs::path& root) {
 
 }  // namespace
 
-Recording read_euroc(const fs::path& root) {
+Recording read_euroc(const fs::path& root, Damaged damaged) {
   const fs::path mav0 = find_mav0(root);
   Recording recording;
   recording.body_name = "imu0";
@@ -174,12 +174,15 @@ Recording read_euroc(const fs::path& root) {
     recording.cameras.push_back(read_camera(folder));
   }
   add_images(images, &recording);
-  if (fs::is_directory(mav0 / "imu0")) {
-    recording.imu_calibration = read_imu_calibration(mav0 / "imu0");
+  const auto read_imu_folder = [&] {
+    const ImuCalibration calibration = read_imu_calibration(mav0 / "imu0");
     read_imu(mav0 / "imu0", &recording);
-  }
+    recording.imu_calibration = calibration;
+  };
+  if (fs::is_directory(mav0 / "imu0")) read_sensor(damaged, read_imu_folder, &recording.imu, &recording);
   const fs::path truth = mav0 / "state_groundtruth_estimate0" / "data.csv";
-  if (fs::exists(truth)) read_truth(truth, &recording);
+  if (fs::exists(truth))
+    read_sensor(damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
   complete_cameras(mav0 / "cam0" / "sensor.yaml", &recording);
   return recording;
 }

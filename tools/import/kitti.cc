@@ -190,7 +190,7 @@ std::string sequences_of(const fs::path& root) {
 
 }  // namespace
 
-Recording read_kitti(const fs::path& root, const std::string& sequence) {
+Recording read_kitti(const fs::path& root, const std::string& sequence, Damaged damaged) {
   const fs::path folder = root / "sequences" / sequence;
   require_folder(root, "'sequences', a KITTI recording");
   if (!fs::is_directory(folder)) {
@@ -211,11 +211,14 @@ Recording read_kitti(const fs::path& root, const std::string& sequence) {
   const std::vector<std::int64_t> utimes = image_times(folder, images[0].rbegin()->first + 1);
   add_images(images, utimes, &recording);
   const fs::path poses = root / "poses" / (sequence + ".txt");
-  if (fs::exists(poses)) {
-    read_poses(poses, utimes, &recording);
-  } else if (fs::exists(folder / "gps_xy.txt")) {
-    read_gps(folder / "gps_xy.txt", &recording);
-  }
+  const auto read_truth = [&] {
+    if (fs::exists(poses)) {
+      read_poses(poses, utimes, &recording);
+    } else if (fs::exists(folder / "gps_xy.txt")) {
+      read_gps(folder / "gps_xy.txt", &recording);
+    }
+  };
+  read_sensor(damaged, read_truth, &recording.truth, &recording);
   complete_cameras(folder / "calib.txt", &recording);
   return recording;
 }

@@ -14,7 +14,8 @@ namespace farpoint::tools {
 // images are 0.1 s apart. The data set names no body: it stands at camera 0, x forward, y left, z up. The
 // truth keeps the data set's world, so its positions are the file's own; gps_xy.txt (`seconds east north`) is
 // truth of position only, with z = 0, used where there is no pose file. Throws InputError naming file and
-// line.
-[[nodiscard]] Recording read_kitti(const std::filesystem::path& root, const std::string& sequence);
+// line; for truth as `damaged` has it.
+[[nodiscard]] Recording read_kitti(const std::filesystem::path& root, const std::string& sequence,
+                                   Damaged damaged = Damaged::kLeftOut);
 
 }  // namespace farpoint::tools

@@ -5,10 +5,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/config/errors.h"
 #include "ipc/image_codec.h"
 #include "slam/geometry/camera.h"
 #include "slam/geometry/se3.h"
@@ -107,6 +109,23 @@ void add_camera(const daemon::CameraFile& content, const std::string& origin, co
 // Sets parameters.width/height of 0 from the first image of each camera, checks each camera, and fills an
 // unknown rate by the median interval of the images. Throws InputError naming the file `calibration`.
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording);
+
+// Whether a sensor's file that is damaged stops an import; images and their calibration always do.
+enum class Damaged : std::uint8_t { kLeftOut, kRefused };
+
+// Calls `read`, which reads a sensor's files into `samples`. Where it refuses them the recording goes on
+// without, and a notice says so; with kRefused its InputError is thrown.
+template <typename Sample>
+void read_sensor(Damaged damaged, const std::function<void()>& read, std::vector<Sample>* samples,
+                 Recording* recording) {
+  try {
+    read();
+  } catch (const daemon::InputError& error) {
+    if (damaged == Damaged::kRefused) throw;
+    samples->clear();
+    recording->notices.push_back(std::string(error.what()) + "; imported without this sensor");
+  }
+}
 
 // Keeps `frames` instants of the images (0: all that follow) from number `first` on, and IMU samples and
 // truth of that time and half a second on either side. Throws InputError naming `recording_name` without such

@@ -81,7 +81,7 @@ std::uint32_t RosBag::number(const Record& record, const std::string& name) cons
 }
 
 Chunk RosBag::load_chunk(std::uint64_t part) {
-  const Record record = record_at({0, part}, file().size());
+  Record record = record_at({0, part}, file().size());
   const std::string& name = record.header["compression"];
   const Compression compression = name == "bz2" ? Compression::kBz2 : Compression::kLz4;
   return unpack(compression, record.data.offset, record.data_bytes, number(record, "size"));

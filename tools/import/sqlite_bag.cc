@@ -97,7 +97,7 @@ class SqliteBag::Statement {
   [[noreturn]] void refuse() const {
     const int code = sqlite3_errcode(bag_.database_);
     const std::string why = sqlite3_errmsg(bag_.database_);
-    bag_.fail({}, code == SQLITE_ERROR ? std::string(kLayout) + " (" + why + ")"
+    bag_.SqliteBag::fail({}, code == SQLITE_ERROR ? std::string(kLayout) + " (" + why + ")"
                                        : "a damaged database (" + why + ")");
   }
 

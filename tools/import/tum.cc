@@ -46,12 +46,14 @@ void read_truth(const fs::path& file, Recording* recording) {
 
 }  // namespace
 
-Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file) {
+Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file, Damaged damaged) {
   require_folder(folder, "rgb.txt");
   Recording recording;
   add_camera(camera_file, "rgb", &recording);
   read_images(folder, &recording);
-  if (fs::exists(folder / "groundtruth.txt")) read_truth(folder / "groundtruth.txt", &recording);
+  const fs::path truth = folder / "groundtruth.txt";
+  if (fs::exists(truth))
+    read_sensor(damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
   complete_cameras(camera_file, &recording);
   return recording;
 }

@@ -12,8 +12,9 @@ namespace farpoint::tools {
 // The intrinsics come from a camera file, since the data set keeps them on a web page. Without T_body_camera
 // in it the body stands at the camera, x forward, y left, z up. The truth keeps the data set's world and is
 // turned into the body's. groundtruth.txt may be absent. Images that are listed but absent are counted and
-// left out. Throws InputError naming file and line.
+// left out. Throws InputError naming file and line; for truth as `damaged` has it.
 [[nodiscard]] Recording read_tum_rgbd(const std::filesystem::path& folder,
-                                      const std::filesystem::path& camera_file);
+                                      const std::filesystem::path& camera_file,
+                                      Damaged damaged = Damaged::kLeftOut);
 
 }  // namespace farpoint::tools

@@ -38,7 +38,7 @@ Trajectory read_tum(const std::filesystem::path& file) {
   for (const FieldLine& line : text.lines()) {
     line.require_fields(8, kTumLayout);
     TimedPose pose;
-    pose.time_s = line.number_at(0, "seconds");
+    pose.time_s = line.seconds_at(0, "seconds");
     pose.pose.t = {line.number_at(1, "tx"), line.number_at(2, "ty"), line.number_at(3, "tz")};
     bool is_identity = false;
     pose.pose.q = read_quaternion(line, &is_identity);
