@@ -22,6 +22,7 @@ std::span<const Target> targets() {
       {"evaluate", run_evaluate, seeds_of_run, 16384},
       {"report", run_report, seeds_of_run, 16384},
       {"bag", run_bag, seeds_of_bag, 4096},
+      {"db3", run_db3, seeds_of_db3, 8192},
       {"stamps", run_stamps, seeds_of_stamps, 512},
   };
   return all;

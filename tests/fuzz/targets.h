@@ -49,6 +49,7 @@ void run_control(ByteView input);
 void run_evaluate(ByteView input);
 void run_report(ByteView input);
 void run_bag(ByteView input);
+void run_db3(ByteView input);
 void run_stamps(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_log();
 [[nodiscard]] std::vector<Bytes> seeds_of_message();
@@ -61,6 +62,7 @@ void run_stamps(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_control();
 [[nodiscard]] std::vector<Bytes> seeds_of_run();
 [[nodiscard]] std::vector<Bytes> seeds_of_bag();
+[[nodiscard]] std::vector<Bytes> seeds_of_db3();
 [[nodiscard]] std::vector<Bytes> seeds_of_stamps();
 
 }  // namespace farpoint::fuzz
