@@ -7,7 +7,7 @@ file(GLOB_RECURSE fuzzed CONFIGURE_DEPENDS
      ${CMAKE_SOURCE_DIR}/daemon/config/*.cc ${CMAKE_SOURCE_DIR}/tools/common/*.cc ${CMAKE_SOURCE_DIR}/tools/evaluate/*.cc
      ${CMAKE_SOURCE_DIR}/tools/report/*.cc ${CMAKE_SOURCE_DIR}/tools/trajectory/*.cc ${CMAKE_CURRENT_LIST_DIR}/*.cc)
 list(FILTER fuzzed EXCLUDE REGEX "(_main|_test|/daemon/config/(options|build_info))[.]cc$")
-foreach(reader bag bag_file bag_topics byte_file chunk images mcap recording ros_bag ros_message sqlite_bag)
+foreach(reader bag bag_file bag_topics byte_file chunk images mcap recording rectified_pair ros_bag ros_message sqlite_bag)
   list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/tools/import/${reader}.cc)
 endforeach()
 list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/daemon/system/control_socket.cc ${CMAKE_SOURCE_DIR}/daemon/system/service_log.cc

@@ -10,10 +10,12 @@
 #include "tools/import/bag.h"
 #include "tools/import/euroc.h"
 #include "tools/import/images.h"
+#include "tools/import/kaist.h"
 #include "tools/import/kitti.h"
 #include "tools/import/recording_log.h"
 #include "tools/import/tum.h"
 #include "tools/import/video.h"
+#include "tools/import/zurich.h"
 
 namespace farpoint::tools {
 namespace {
@@ -111,6 +113,42 @@ void add_images_command(CLI::App* import, const std::shared_ptr<ImportOptions>& 
       "  farpoint import images /data/drive --rate 30 --camera front.yaml -o drive.lcm\n"
       "  farpoint import images /data/drive --times names --camera front.yaml -o drive.lcm");
   images->callback([=] { *action = [=] { return import_images(*options); }; });
+}
+
+void add_urban_commands(CLI::App* import, const std::shared_ptr<ImportOptions>& options, Action* action) {
+  CLI::App* kaist =
+      add_layout(import, "kaist", "KAIST Urban: DIR holds image, sensor_data and calibration", options.get());
+  add_strict(kaist, options.get());
+  kaist->footer(
+      "Reads image/stereo_left and stereo_right with calibration/left.yaml, right.yaml and "
+      "Vehicle2Stereo.txt, and where\n"
+      "there are any sensor_data/xsens_imu.csv, encoder.csv and global_pose.csv. Bayer patterns become grey "
+      "PNG images.\n"
+      "Example: farpoint import kaist /data/kaist/urban28 -o urban28.lcm");
+  kaist->callback([=] {
+    *action = [=] {
+      return write_and_report(read_kaist(options->folder, options->damaged()), *options, read_kaist_image);
+    };
+  });
+
+  CLI::App* zurich =
+      add_layout(import, "zurich", "Zurich Urban MAV: DIR holds 'MAV Images' and 'Log Files'", options.get());
+  zurich
+      ->add_option("--camera", options->camera_file,
+                   "Camera file (config/cameras), or a calibration of ROS, Kalibr or OpenCV")
+      ->required();
+  add_strict(zurich, options.get());
+  zurich->footer(
+      "Reads the images with their times from OnboardGPS.csv, RawGyro.csv and RawAccel.csv, and positions from "
+      "GroundTruthAGL.csv.\n"
+      "calibration_data.npz is not read: write its numbers into a camera file.\n"
+      "Example: farpoint import zurich /data/AGZ --camera agz.yaml -o agz.lcm");
+  zurich->callback([=] {
+    *action = [=] {
+      return write_and_report(read_zurich(options->folder, options->camera_file, options->damaged()),
+                              *options);
+    };
+  });
 }
 
 int list_topics(const std::string& file) {
@@ -242,6 +280,7 @@ void add_import_command(CLI::App* app, Action* action) {
     };
   });
 
+  add_urban_commands(import, options, action);
   add_images_command(import, options, action);
   add_bag_command(import, options, action);
   add_video_command(import, options, action);

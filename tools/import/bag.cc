@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
 #include <utility>
 
 #include "daemon/config/camera_file.h"
-#include "daemon/config/yaml_file.h"
 #include "tools/common/errors.h"
 #include "tools/import/bag_file.h"
 #include "tools/import/ros_message.h"
@@ -339,25 +337,13 @@ class Cameras {
     add_camera(daemon::parse_camera_file(info->calibration, origin), origin, name_of(camera), recording_);
   }
 
-  // The rectified cameras have parallel axes and stand beside one another.
   void place_second(const RosCameraInfo& first, const RosCameraInfo& second) {
-    constexpr double kMaxBaseline_m = 10.0;
-    const double right_m = second.right_m - first.right_m;
-    slam::SE3 R_first, R_second;
-    if (!(std::abs(right_m) > 1e-6 && std::abs(right_m) < kMaxBaseline_m) ||
-        !rotation_of(first, &R_first) || !rotation_of(second, &R_second))
+    const std::optional<slam::SE3> T_first_second = second_camera(first.rectification, second.rectification);
+    if (!T_first_second)
       throw InputError(bag_ + ": " + topics_.infos[1].name +
                        " has no rectification of a pair (R, and fx * baseline in P), expected --camera and "
                        "--second-camera with T_body_camera");
-    const slam::SE3 T_first_second =
-        R_first.inverse() * slam::SE3{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}} * R_second;
-    recording_->cameras[1].T_body_camera = recording_->cameras[0].T_body_camera * T_first_second;
-  }
-
-  static bool rotation_of(const RosCameraInfo& info, slam::SE3* rotation) {
-    Eigen::Matrix<double, 3, 4> matrix = Eigen::Matrix<double, 3, 4>::Zero();
-    matrix.leftCols<3>() = info.rectification;
-    return info.rectification.allFinite() && daemon::to_rigid_motion(matrix, rotation);
+    recording_->cameras[1].T_body_camera = recording_->cameras[0].T_body_camera * *T_first_second;
   }
 
   const std::string& bag_;

@@ -51,11 +51,6 @@ std::string quotable(std::string_view text) {
   return result;
 }
 
-// Where a rectified camera stands on the x axis that it shares with the pair's first: p = P's last column.
-double right_of(const std::array<double, 12>& p) {
-  return -p[3] / p[0];
-}
-
 std::optional<RosTwist> twist_of(RosFields* fields, std::int64_t utime) {
   const std::array<double, 6> twist = numbers<6>(fields);
   if (!fields->ok() || !std::isfinite(twist[0]) || !std::isfinite(twist[5])) return {};
@@ -239,8 +234,7 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
                      "\nbinning_x: " + std::to_string(binning_x) + "\nbinning_y: " + std::to_string(binning_y) +
                      "\nroi: {x_offset: " + std::to_string(x_offset) +
                      ", y_offset: " + std::to_string(y_offset) + "}\n";
-  info.rectification = Eigen::Map<const Eigen::Matrix3d>(r.data()).transpose();
-  info.right_m = right_of(p);
+  info.rectification = rectification_of(r, p);
   return info;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "tools/import/rectified_pair.h"
 
 namespace farpoint::tools {
 
@@ -78,11 +79,7 @@ enum class RosPoseLayout : std::uint8_t {
 // sensor_msgs/CameraInfo.
 struct RosCameraInfo {
   std::string calibration;  // of the raw image, as a file's text, which daemon::parse_camera_file takes
-  // The rectified cameras of a stereo pair have parallel axes: R turns the raw camera's axes into theirs, and
-  // the camera stands `right_m` to the right of the pair's first; not finite where the message has no such R
-  // and P.
-  Eigen::Matrix3d rectification = Eigen::Matrix3d::Zero();
-  double right_m = 0.0;
+  Rectification rectification;
 };
 
 // `head` is the beginning of a message of `message_bytes`: kImageHeadBytes of it, or all.
