@@ -63,8 +63,7 @@ std::string bz2(std::string content) {
 
 std::string lz4(const std::string& content) {
   std::string packed(LZ4F_compressFrameBound(content.size(), nullptr), '\0');
-  packed.resize(
-      LZ4F_compressFrame(packed.data(), packed.size(), content.data(), content.size(), nullptr));
+  packed.resize(LZ4F_compressFrame(packed.data(), packed.size(), content.data(), content.size(), nullptr));
   return packed;
 }
 
@@ -85,9 +84,9 @@ Bytes bag_seed(const std::string& compression) {
   std::string bag = "#ROSBAG V2.0\n";
   bag.append(bag_record({field("op", "\3")}, ""));
   const std::string packed = compression == "bz2" ? bz2(chunk) : compression == "lz4" ? lz4(chunk) : chunk;
-  bag.append(bag_record({field("op", "\5"), field("compression", compression),
-                         field("size", little_endian(chunk.size(), 4))},
-                        packed));
+  bag.append(bag_record(
+      {field("op", "\5"), field("compression", compression), field("size", little_endian(chunk.size(), 4))},
+      packed));
   return bytes_of(bag);
 }
 
@@ -174,7 +173,6 @@ const std::filesystem::path& pictures() {
   return kFolder;
 }
 
-
 // The first two topics of images, and any topic that may be truth or wheels.
 tools::BagChoice choice_of(const std::vector<tools::BagTopic>& topics) {
   tools::BagChoice choice;
@@ -239,8 +237,8 @@ void run_stamps(ByteView input) {
 }
 
 std::vector<Bytes> seeds_of_bag() {
-  return {bag_seed("none"), bag_seed("bz2"), bag_seed("lz4"), mcap_seed(""), mcap_seed("lz4"),
-          mcap_seed("zstd")};
+  return {bag_seed("none"), bag_seed("bz2"),  bag_seed("lz4"),
+          mcap_seed(""),    mcap_seed("lz4"), mcap_seed("zstd")};
 }
 
 std::vector<Bytes> seeds_of_db3() {

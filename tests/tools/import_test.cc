@@ -158,7 +158,8 @@ TEST_P(KittiDamage, IsNamed) {
   const ScratchFolder root;
   make_kitti(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); }), GetParam().complaint);
+  expect_all_in(complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); }),
+                GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -276,7 +277,8 @@ TEST_P(EurocDamage, IsNamed) {
   const ScratchFolder root;
   make_euroc(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_euroc(root.path(), Damaged::kRefused); }), GetParam().complaint);
+  expect_all_in(complaint_of([&] { (void)read_euroc(root.path(), Damaged::kRefused); }),
+                GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -377,8 +379,9 @@ TEST_P(TumDamage, IsNamed) {
   const ScratchFolder root;
   make_tum(root.path());
   GetParam().spoil(root.path());
-  expect_all_in(complaint_of([&] { (void)read_tum_rgbd(root.path(), root / "camera.yaml", Damaged::kRefused); }),
-                GetParam().complaint);
+  expect_all_in(
+      complaint_of([&] { (void)read_tum_rgbd(root.path(), root / "camera.yaml", Damaged::kRefused); }),
+      GetParam().complaint);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -31,8 +31,9 @@ void expect_misuse(const std::string& arguments, const std::string& part) {
 TEST(Program, HelpTeaches) {
   for (const char* arguments :
        {"--help", "import --help", "import kitti --help", "import euroc --help", "import tum --help",
-        "import kaist --help", "import zurich --help", "import images --help", "import bag --help", "import video --help", "export --help",
-        "evaluate --help", "bench --help", "ctl --help", "top --help"}) {
+        "import kaist --help", "import zurich --help", "import images --help", "import bag --help",
+        "import video --help", "export --help", "evaluate --help", "bench --help", "ctl --help",
+        "top --help"}) {
     const ProgramResult result = run_farpoint_program(arguments);
     EXPECT_EQ(result.status, 0) << arguments;
     EXPECT_EQ(result.err, "") << arguments;
@@ -49,8 +50,9 @@ TEST(Program, WrongUseIsStatusTwoAndOneLine) {
   expect_misuse("", "no command");
   expect_misuse("improt", "unknown command 'improt', expected one of: import");
   expect_misuse("import", "no import, expected one of: kitti, euroc, tum, kaist, zurich, images, bag, video");
-  expect_misuse("import ros " + root,
-                "unknown import 'ros', expected one of: kitti, euroc, tum, kaist, zurich, images, bag, video");
+  expect_misuse(
+      "import ros " + root,
+      "unknown import 'ros', expected one of: kitti, euroc, tum, kaist, zurich, images, bag, video");
   expect_misuse("import kitti " + root + " -o " + quoted(folder / "x.lcm"), "SEQUENCE");
   expect_misuse("import kitti " + root + " 07", "--output");
   expect_misuse("import kitti " + root + " 08 -o " + quoted(folder / "x.lcm"),

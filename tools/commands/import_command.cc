@@ -139,7 +139,8 @@ void add_urban_commands(CLI::App* import, const std::shared_ptr<ImportOptions>& 
       ->required();
   add_strict(zurich, options.get());
   zurich->footer(
-      "Reads the images with their times from OnboardGPS.csv, RawGyro.csv and RawAccel.csv, and positions from "
+      "Reads the images with their times from OnboardGPS.csv, RawGyro.csv and RawAccel.csv, and positions "
+      "from "
       "GroundTruthAGL.csv.\n"
       "calibration_data.npz is not read: write its numbers into a camera file.\n"
       "Example: farpoint import zurich /data/AGZ --camera agz.yaml -o agz.lcm");
@@ -191,7 +192,8 @@ void add_bag_command(CLI::App* import, const std::shared_ptr<ImportOptions>& opt
       "Images of sensor_msgs/Image are stored as grey, those of CompressedImage as they are (PNG or JPEG).\n"
       "A message's time is its header's. Chunks may be compressed (bz2, lz4, zstd). Without --second-camera "
       "the\n"
-      "second camera's place follows from R and P of camera_info, as stereo calibrations have them. Images up "
+      "second camera's place follows from R and P of camera_info, as stereo calibrations have them. Images "
+      "up "
       "to\n"
       "5 ms apart are a pair.\n"
       "Examples:\n"
@@ -257,7 +259,9 @@ void add_import_command(CLI::App* app, Action* action) {
       "from\n"
       "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').");
   kitti->callback([=] {
-    *action = [=] { return write_and_report(read_kitti(options->folder, options->sequence, options->damaged()), *options); };
+    *action = [=] {
+      return write_and_report(read_kitti(options->folder, options->sequence, options->damaged()), *options);
+    };
   });
 
   CLI::App* euroc = add_layout(import, "euroc", "EuRoC (ASL): DIR holds mav0, or is it", options.get());
@@ -266,7 +270,9 @@ void add_import_command(CLI::App* app, Action* action) {
       "Reads cam0, cam1 and imu0 where there are any, and state_groundtruth_estimate0. Images missing on one "
       "side are\n"
       "counted and left out.");
-  euroc->callback([=] { *action = [=] { return write_and_report(read_euroc(options->folder, options->damaged()), *options); }; });
+  euroc->callback([=] {
+    *action = [=] { return write_and_report(read_euroc(options->folder, options->damaged()), *options); };
+  });
 
   CLI::App* tum = add_layout(import, "tum", "TUM RGB-D: DIR holds rgb.txt", options.get());
   tum->add_option("--camera", options->camera_file,
@@ -276,7 +282,8 @@ void add_import_command(CLI::App* app, Action* action) {
   tum->footer("Reads rgb.txt and groundtruth.txt where there is one. Depth is not read.");
   tum->callback([=] {
     *action = [=] {
-      return write_and_report(read_tum_rgbd(options->folder, options->camera_file, options->damaged()), *options);
+      return write_and_report(read_tum_rgbd(options->folder, options->camera_file, options->damaged()),
+                              *options);
     };
   });
 

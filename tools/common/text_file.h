@@ -20,9 +20,10 @@ class FieldLine {
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] std::string_view text(std::size_t i) const;
 
-  // Field i as a finite number, as an integer, as seconds, as seconds turned into microseconds, as nanoseconds
-  // turned into microseconds (both rounded to nearest). Whole numbers of 1e17 and more are taken for
-  // nanoseconds since 1970 where seconds are asked for. `what` names the value in the error. Throw InputError.
+  // Field i as a finite number, as an integer, as seconds, as seconds turned into microseconds, as
+  // nanoseconds turned into microseconds (both rounded to nearest). Whole numbers of 1e17 and more are taken
+  // for nanoseconds since 1970 where seconds are asked for. `what` names the value in the error. Throw
+  // InputError.
   [[nodiscard]] double number_at(std::size_t i, std::string_view what) const;
   [[nodiscard]] std::int64_t integer_at(std::size_t i, std::string_view what) const;
   [[nodiscard]] double seconds_at(std::size_t i, std::string_view what) const;

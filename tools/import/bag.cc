@@ -91,7 +91,8 @@ ChosenTopics choose(const BagTopics& topics, const BagChoice& choice, const std:
   if (chosen.images.size() == 2 && chosen.images[0].name == chosen.images[1].name)
     throw InputError(bag + ": --second-image " + choice.second_image +
                      ": is the first camera's topic, expected another");
-  for (const Topic& image : chosen.images) chosen.infos.push_back({camera_info_topic(image.name), kCameraInfo});
+  for (const Topic& image : chosen.images)
+    chosen.infos.push_back({camera_info_topic(image.name), kCameraInfo});
   chosen.imu = choose_imu(topics, choice.imu, bag, recording);
   if (!choice.wheels.empty())
     chosen.wheels = topic_of(topics.require(choice.wheels, "--wheels", wheel_types()));
@@ -317,9 +318,10 @@ class Cameras {
     for (const fs::path& file : {choice_.camera_file, choice_.second_camera_file}) {
       const daemon::CameraFile content = daemon::read_camera_file(file);
       if (!content.T_body_camera)
-        throw InputError(file.string() +
-                         ": no T_body_camera, expected it (or mount) in both cameras' files: where one stands "
-                         "relative to the other");
+        throw InputError(
+            file.string() +
+            ": no T_body_camera, expected it (or mount) in both cameras' files: where one stands "
+            "relative to the other");
       add_camera(content, file.string(), name_of(camera++), recording_);
     }
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recordings of ROS: bags of ROS 1, MCAP, and ROS 2's SQLite bags (a file, or the folder with its
-// metadata.yaml). One camera's images or two cameras', and where there are any an IMU, wheel speeds and truth.
-// Pixels stay in the bag until they are copied into the log.
+// metadata.yaml). One camera's images or two cameras', and where there are any an IMU, wheel speeds and
+// truth. Pixels stay in the bag until they are copied into the log.
 #pragma once
 
 #include <filesystem>

@@ -37,7 +37,8 @@ Chunk ChunkedBag::unpack(Compression compression, std::uint64_t offset, std::uin
                            " bytes, expected at most 128 MiB");
   std::optional<Chunk> content = decompress(compression, file_.read(offset, bytes), content_bytes);
   if (!content)
-    file_.fail(offset, "a damaged chunk, expected one that holds " + std::to_string(content_bytes) + " bytes");
+    file_.fail(offset,
+               "a damaged chunk, expected one that holds " + std::to_string(content_bytes) + " bytes");
   return std::move(*content);
 }
 
@@ -65,7 +66,7 @@ std::unique_ptr<BagFile> open_bag(const std::filesystem::path& path) {
   if (begins_with(kRosBagMagic)) return std::make_unique<RosBag>(path);
   if (begins_with(kMcapMagic)) return std::make_unique<McapFile>(path);
   if (begins_with(kSqliteMagic)) return std::make_unique<SqliteBag>(path);
-  const std::string wrong = ipc::wrong_kind(path.string(), "a ROS bag");
+  const std::string wrong = ipc::wrong_kind(path.string(), "a ROS 1 or ROS 2 bag");
   if (!wrong.empty() && wrong.find("a ROS 1 bag,") == std::string::npos) throw InputError(wrong);
   throw InputError(path.string() +
                    ": expected a ROS 1 bag (it begins with #ROSBAG V2.0), an MCAP recording or a ROS 2 bag "

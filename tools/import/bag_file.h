@@ -22,8 +22,8 @@ struct BagConnection {
   RosPacking packing = RosPacking::kRos1;
 };
 
-// A byte of a bag. Its parts are compressed chunks, named by the byte at which their record begins, or rows of
-// a database, named by their id; part 0 is the file itself.
+// A byte of a bag. Its parts are compressed chunks, named by the byte at which their record begins, or rows
+// of a database, named by their id; part 0 is the file itself.
 struct BagPlace {
   std::uint64_t part = 0, offset = 0;
 };
@@ -47,8 +47,8 @@ class BagFile {
 
   [[nodiscard]] virtual const std::filesystem::path& path() const = 0;
   // Calls back for each connection once, before its messages, and for each message. A bag's own index is not
-  // used. Types have no "/msg"; those of other encodings than ROS's have the encoding before their name. Throws
-  // InputError naming the place: damage, a cut off end, lengths beyond their limits.
+  // used. Types have no "/msg"; those of other encodings than ROS's have the encoding before their name.
+  // Throws InputError naming the place: damage, a cut off end, lengths beyond their limits.
   virtual void read_all(const OnConnection& on_connection, const OnMessage& on_message) = 0;
   // Bytes from `place` on. Throws InputError, before any memory is taken, where there are fewer.
   [[nodiscard]] virtual std::string read(const BagPlace& place, std::uint64_t bytes) = 0;

@@ -84,7 +84,8 @@ const BagTopic& BagTopics::require(const std::string& name, const char* option,
 std::vector<fs::path> files_of_bag(const fs::path& path) {
   if (!fs::is_directory(path)) return {path};
   if (!fs::exists(path / "metadata.yaml"))
-    throw InputError(path.string() + ": a folder without metadata.yaml, expected a bag or a ROS 2 bag's folder");
+    throw InputError(path.string() +
+                     ": a folder without metadata.yaml, expected a bag or a ROS 2 bag's folder");
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
     const fs::path extension = entry.path().extension();

@@ -25,8 +25,8 @@ bool unpack_lz4(std::string_view packed, const Chunk& content) {
   std::size_t taken = 0, written = 0, expected = 1;  // expected: 0 at the end of the frame
   while (expected != 0) {
     std::size_t room = content.size - written, left = packed.size() - taken;
-    expected = LZ4F_decompress(context, content.bytes.get() + written, &room, packed.data() + taken, &left,
-                               nullptr);
+    expected =
+        LZ4F_decompress(context, content.bytes.get() + written, &room, packed.data() + taken, &left, nullptr);
     if (LZ4F_isError(expected) != 0 || (room == 0 && left == 0)) break;
     written += room;
     taken += left;
@@ -36,8 +36,7 @@ bool unpack_lz4(std::string_view packed, const Chunk& content) {
 }
 
 bool unpack_zstd(std::string_view packed, const Chunk& content) {
-  const std::size_t size =
-      ZSTD_decompress(content.bytes.get(), content.size, packed.data(), packed.size());
+  const std::size_t size = ZSTD_decompress(content.bytes.get(), content.size, packed.data(), packed.size());
   return ZSTD_isError(size) == 0 && size == content.size;
 }
 

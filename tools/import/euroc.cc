@@ -182,7 +182,8 @@ Recording read_euroc(const fs::path& root, Damaged damaged) {
   if (fs::is_directory(mav0 / "imu0")) read_sensor(damaged, read_imu_folder, &recording.imu, &recording);
   const fs::path truth = mav0 / "state_groundtruth_estimate0" / "data.csv";
   if (fs::exists(truth))
-    read_sensor(damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
+    read_sensor(
+        damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
   complete_cameras(mav0 / "cam0" / "sensor.yaml", &recording);
   return recording;
 }

@@ -204,9 +204,11 @@ void read_sensors(const fs::path& root, Damaged damaged, Recording* recording) {
   };
   if (fs::exists(imu)) read_sensor(damaged, read_imu_and_place, &recording->imu, recording);
   if (fs::exists(root / "sensor_data" / "encoder.csv"))
-    read_sensor(damaged, [&] { read_wheels(root, recording); }, &recording->wheels, recording);
+    read_sensor(
+        damaged, [&] { read_wheels(root, recording); }, &recording->wheels, recording);
   if (fs::exists(truth))
-    read_sensor(damaged, [&] { read_truth(truth, recording); }, &recording->truth, recording);
+    read_sensor(
+        damaged, [&] { read_truth(truth, recording); }, &recording->truth, recording);
 }
 
 // ---- Bayer patterns ----

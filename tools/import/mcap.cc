@@ -172,8 +172,7 @@ class McapFile::Walk {
     (void)fields.number(4);  // sequence
     const std::uint64_t log_time = fields.number(8);
     (void)fields.number(8);  // time of publishing
-    if (!channels_.contains(message.connection))
-      file_.fail(record.place, "a message of an unknown channel");
+    if (!channels_.contains(message.connection)) file_.fail(record.place, "a message of an unknown channel");
     if (log_time > static_cast<std::uint64_t>(INT64_MAX) / 2)
       file_.fail(record.place, "a time beyond any date");
     message.received_ns = static_cast<std::int64_t>(log_time);

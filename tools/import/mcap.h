@@ -29,8 +29,8 @@ class McapFile : public ChunkedBag {
     [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
   };
   struct ChunkHead {
-    std::string compression;          // empty: none
-    std::uint64_t content_bytes = 0;  // decompressed
+    std::string compression;              // empty: none
+    std::uint64_t content_bytes = 0;      // decompressed
     std::uint64_t offset = 0, bytes = 0;  // of its records in the file, as they are stored
   };
 

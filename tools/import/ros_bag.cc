@@ -147,8 +147,7 @@ class RosBag::Walk {
   void take_message(const Record& record) const {
     BagMessage message;
     message.connection = bag_.number(record, "conn");
-    if (!known_.contains(message.connection))
-      bag_.fail(record.place, "a message of an unknown connection");
+    if (!known_.contains(message.connection)) bag_.fail(record.place, "a message of an unknown connection");
     const std::string time = bag_.field(record, "time", 8);
     const std::uint64_t seconds = little_endian(time.substr(0, 4)), rest = little_endian(time.substr(4));
     message.received_ns = static_cast<std::int64_t>(seconds * 1'000'000'000 + rest);

@@ -229,11 +229,11 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
   const std::uint32_t x_offset = fields.u32(), y_offset = fields.u32();
   if (!fields.ok() || !all_finite(d) || !all_finite(k)) return {};
   RosCameraInfo info;
-  info.calibration = "width: " + std::to_string(width) + "\nheight: " + std::to_string(height) +
-                     "\ndistortion_model: \"" + model + "\"\nD: " + list_text(d) + "\nK: " + list_text(k) +
-                     "\nbinning_x: " + std::to_string(binning_x) + "\nbinning_y: " + std::to_string(binning_y) +
-                     "\nroi: {x_offset: " + std::to_string(x_offset) +
-                     ", y_offset: " + std::to_string(y_offset) + "}\n";
+  info.calibration =
+      "width: " + std::to_string(width) + "\nheight: " + std::to_string(height) + "\ndistortion_model: \"" +
+      model + "\"\nD: " + list_text(d) + "\nK: " + list_text(k) +
+      "\nbinning_x: " + std::to_string(binning_x) + "\nbinning_y: " + std::to_string(binning_y) +
+      "\nroi: {x_offset: " + std::to_string(x_offset) + ", y_offset: " + std::to_string(y_offset) + "}\n";
   info.rectification = rectification_of(r, p);
   return info;
 }

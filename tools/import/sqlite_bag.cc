@@ -98,7 +98,7 @@ class SqliteBag::Statement {
     const int code = sqlite3_errcode(bag_.database_);
     const std::string why = sqlite3_errmsg(bag_.database_);
     bag_.SqliteBag::fail({}, code == SQLITE_ERROR ? std::string(kLayout) + " (" + why + ")"
-                                       : "a damaged database (" + why + ")");
+                                                  : "a damaged database (" + why + ")");
   }
 
   const SqliteBag& bag_;
@@ -130,12 +130,14 @@ void SqliteBag::limit_work() {
   sqlite3_limit(database_, SQLITE_LIMIT_ATTACHED, 0);
   sqlite3_limit(database_, SQLITE_LIMIT_EXPR_DEPTH, 20);
   sqlite3_limit(database_, SQLITE_LIMIT_COLUMN, 100);
-  for (const auto& [option, on] :
-       {std::pair{SQLITE_DBCONFIG_DEFENSIVE, 1}, {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
-        {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0}, {SQLITE_DBCONFIG_ENABLE_VIEW, 0},
-        {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0}})
+  for (const auto& [option, on] : {std::pair{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                   {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                   {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0},
+                                   {SQLITE_DBCONFIG_ENABLE_VIEW, 0},
+                                   {SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0}})
     sqlite3_db_config(database_, option, on, static_cast<int*>(nullptr));
-  sqlite3_exec(database_, "PRAGMA cell_size_check=ON; PRAGMA mmap_size=0; PRAGMA temp_store=MEMORY", nullptr, nullptr, nullptr);
+  sqlite3_exec(database_, "PRAGMA cell_size_check=ON; PRAGMA mmap_size=0; PRAGMA temp_store=MEMORY", nullptr,
+               nullptr, nullptr);
 }
 
 void SqliteBag::require_table(const std::string& name) {
@@ -165,8 +167,8 @@ void SqliteBag::read_topics(const OnConnection& on_connection) {
 }
 
 void SqliteBag::read_messages(const OnMessage& on_message) {
-  Statement rows(*this,
-                 "SELECT rowid, topic_id, timestamp, typeof(data), length(data) FROM messages ORDER BY rowid");
+  Statement rows(
+      *this, "SELECT rowid, topic_id, timestamp, typeof(data), length(data) FROM messages ORDER BY rowid");
   while (rows.next()) {
     BagMessage message;
     const std::int64_t id = rows.integer(0), topic = rows.integer(1);

@@ -53,7 +53,8 @@ Recording read_tum_rgbd(const fs::path& folder, const fs::path& camera_file, Dam
   read_images(folder, &recording);
   const fs::path truth = folder / "groundtruth.txt";
   if (fs::exists(truth))
-    read_sensor(damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
+    read_sensor(
+        damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
   complete_cameras(camera_file, &recording);
   return recording;
 }

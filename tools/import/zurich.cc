@@ -93,8 +93,8 @@ std::vector<std::pair<std::int64_t, Eigen::Vector3d>> read_axes(const fs::path& 
     line.require_fields(5, "stamp [us],error count,x,y,z,...");
     const std::int64_t utime = utime_of(line);
     if (!samples.empty() && utime <= samples.back().first) continue;  // logged twice
-    samples.emplace_back(utime, Eigen::Vector3d(line.number_at(2, "x"), line.number_at(3, "y"),
-                                                line.number_at(4, "z")));
+    samples.emplace_back(
+        utime, Eigen::Vector3d(line.number_at(2, "x"), line.number_at(3, "y"), line.number_at(4, "z")));
   }
   return samples;
 }
@@ -138,10 +138,12 @@ Recording read_zurich(const fs::path& root, const fs::path& camera_file, Damaged
   add_camera(camera_file, "camera", &recording);
   read_images(images, logs / "OnboardGPS.csv", &recording);
   if (fs::exists(logs / "RawGyro.csv") && fs::exists(logs / "RawAccel.csv"))
-    read_sensor(damaged, [&] { read_imu(logs, &recording); }, &recording.imu, &recording);
+    read_sensor(
+        damaged, [&] { read_imu(logs, &recording); }, &recording.imu, &recording);
   const fs::path truth = logs / "GroundTruthAGL.csv";
   if (fs::exists(truth))
-    read_sensor(damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
+    read_sensor(
+        damaged, [&] { read_truth(truth, &recording); }, &recording.truth, &recording);
   complete_cameras(camera_file, &recording);
   return recording;
 }

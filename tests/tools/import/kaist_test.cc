@@ -23,7 +23,8 @@ std::string calibration(const std::string& right_column) {
          "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
          "   data: [ 50., 0., 31., 0., 51., 23., 0., 0., 1. ]\ndistortion_model: plumb_bob\n"
          "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
-         "   data: [ -0.05, 0.12, 0., 0., 0. ]\nrectification_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n"
+         "   data: [ -0.05, 0.12, 0., 0., 0. ]\nrectification_matrix: !!opencv-matrix\n   rows: 3\n   cols: "
+         "3\n"
          "   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\nprojection_matrix: !!opencv-matrix\n"
          "   rows: 3\n   cols: 4\n   dt: d\n   data: [ 50., 0., 31., " +
          right_column + ", 0., 50., 23., 0., 0., 0., 1., 0. ]\n";
@@ -82,8 +83,10 @@ TEST_F(ImportKaist, ReadsCamerasOnTheVehicle) {
   EXPECT_EQ(r.cameras[0].parameters.fy_px, 51.0);
   EXPECT_EQ(r.cameras[0].parameters.distortion[1], 0.12);
   EXPECT_NEAR(r.cameras[0].rate_hz, 10.0, 1e-9);
-  EXPECT_TRUE((r.cameras[0].T_body_camera * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2.6, 0.25, 1.5)));
-  EXPECT_TRUE(r.cameras[1].T_body_camera.t.isApprox(Eigen::Vector3d(1.6, -0.25, 1.5))) << "0.5 m to the right";
+  EXPECT_TRUE(
+      (r.cameras[0].T_body_camera * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2.6, 0.25, 1.5)));
+  EXPECT_TRUE(r.cameras[1].T_body_camera.t.isApprox(Eigen::Vector3d(1.6, -0.25, 1.5)))
+      << "0.5 m to the right";
   ASSERT_EQ(r.images.size(), 7U);
   EXPECT_EQ(r.missing_images, 1U);
   EXPECT_EQ(r.images[0].utime, 1'544'582'648'735'120) << "rounded";

@@ -121,7 +121,7 @@ TEST_F(ImportDb3, ASchemaThatComputesIsRefused) {
 }
 
 TEST_F(ImportDb3, AMessageOfAnotherLengthThanItsImageIsDamage) {
-  write_sql("UPDATE messages SET data = substr(data, 1, 2000) WHERE topic_id = 1 AND id > 17");
+  write_sql("UPDATE messages SET data = substr(data, 1, 2000) WHERE topic_id = 1 AND id > 18");
   const Recording r = read_bag(file(), {});
   EXPECT_EQ(r.images.size(), 2U);
   expect_all_in(r.notices.at(0), {"1 damaged messages"});

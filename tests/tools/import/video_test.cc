@@ -159,7 +159,8 @@ TEST_F(ImportVideo, ARawStreamOfJpegNeedsARate) {
   ASSERT_EQ(import("--rate 10").status, 0);
   EXPECT_EQ(images().at(2).utime, 200'000);
   for (const char* name : {"ffprobe.arguments", "ffmpeg.arguments"})
-    EXPECT_NE(get(root_ / name).find("-f mjpeg"), std::string::npos) << "read as what it is, not as a picture";
+    EXPECT_NE(get(root_ / name).find("-f mjpeg"), std::string::npos)
+        << "read as what it is, not as a picture";
 }
 
 TEST_F(ImportVideo, APictureIsNoVideo) {

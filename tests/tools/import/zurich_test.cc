@@ -25,7 +25,8 @@ class ImportZurich : public testing::Test {
                ", 473844060, 85453410, 455000, 0.5\n";
       gyro += stamp + ", 0, 0.01, 0.02, " + std::to_string(i) + ", 40\n";
       accel += std::to_string(7'000'000 + 33'333 * i + 2'000) + ", 0, 0.1, 0.2, -9.8, 40\n";
-      if (i != 2) truth += std::to_string(i) + ", 465671.5, 5247976.25, " + std::to_string(460 + i) + ", 1, 2, 3\n";
+      if (i != 2)
+        truth += std::to_string(i) + ", 465671.5, 5247976.25, " + std::to_string(460 + i) + ", 1, 2, 3\n";
     }
     put(root_ / "Log Files/OnboardGPS.csv", gps);
     put(root_ / "Log Files/GroundTruthAGL.csv", truth);
