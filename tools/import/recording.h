@@ -114,7 +114,7 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
 enum class Damaged : std::uint8_t { kLeftOut, kRefused };
 
 // Calls `read`, which reads a sensor's files into `samples`. Where it refuses them the recording goes on
-// without, and a notice says so; with kRefused its InputError is thrown.
+// without it, and a notice has the reason; with kRefused its InputError is thrown.
 template <typename Sample>
 void read_sensor(Damaged damaged, const std::function<void()>& read, std::vector<Sample>* samples,
                  Recording* recording) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Programs as children: what they print and complain, and how their end is told.
+// Programs as children: what they print and complain, and how they ended.
 #include "tools/common/child_process.h"
 
 #include <gtest/gtest.h>

@@ -107,7 +107,7 @@ TEST_F(ImportDb3, DatabasesThatAreNoBagAreNamed) {
   expect_all_in(complaint(), {"a message of id -4"});
 }
 
-// A schema is a program, which must not run for ever or take all memory.
+// A schema is a program, which must neither run without end nor take all memory.
 TEST_F(ImportDb3, ASchemaThatComputesIsRefused) {
   const std::string rows =
       "DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 "
