@@ -101,7 +101,8 @@ class McapFile::Walk {
       : file_(*file), on_connection_(on_connection), on_message_(on_message) {}
 
   void read_all() {
-    for (std::uint64_t at = kMcapMagic.size(); true;) {
+    std::uint64_t at = kMcapMagic.size();
+    while (true) {
       const Record record = file_.record_at({0, at}, file_.file().size());
       if (record.kind == kFooter) return;
       if (record.kind == kChunk) {
