@@ -91,6 +91,6 @@ class ChunkedBag : public BagFile {
 
 // A ROS 1 bag (2.0), an MCAP recording or a ROS 2 bag in SQLite (.db3), chosen by the first bytes. Throws
 // InputError for other files.
-[[nodiscard]] std::unique_ptr<BagFile> open_bag(const std::filesystem::path& file);
+[[nodiscard]] std::unique_ptr<BagFile> open_bag(const std::filesystem::path& path);
 
 }  // namespace farpoint::tools

@@ -106,7 +106,7 @@ class SqliteBag::Statement {
 };
 
 SqliteBag::SqliteBag(fs::path path) : path_(std::move(path)) {
-  (void)ByteFile(path_);  // a regular file
+  [[maybe_unused]] const ByteFile regular_file(path_);
   refuse_journal(path_);
   sqlite3_hard_heap_limit64(kMaxHeapBytes);
   const int status = sqlite3_open_v2(address_of(path_).c_str(), &database_,
