@@ -21,7 +21,8 @@ constexpr std::size_t kMaxTopics = 10'000;
 constexpr int kStepsBetweenQuestions = 1'000'000, kMaxQuestionsOfRow = 3;
 constexpr sqlite3_int64 kMaxHeapBytes = 256 << 20;
 
-// `file:PATH` with other than plain characters escaped. Immutable: SQLite looks for no journal beside the file.
+// `file:PATH` with other than plain characters escaped. Immutable: SQLite looks for no journal beside the
+// file.
 std::string address_of(const fs::path& path) {
   constexpr const char* kDigits = "0123456789ABCDEF";
   std::string address = "file:";
