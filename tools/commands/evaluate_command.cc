@@ -99,9 +99,28 @@ void print_text(const std::vector<RunMetrics>& runs) {
   std::printf("\n%s", table_text(runs).c_str());
 }
 
+void require_truth_for_its_options(const EvaluateOptions& options) {
+  const bool asks_for_truth = !options.align.empty() || options.planar || options.truth_point != "auto" ||
+                              !options.segments.empty();
+  if (asks_for_truth && options.truth.empty()) {
+    throw InputError(
+        "--align, --planar, --truth-point and --segments compare with truth, expected --truth FILE beside them");
+  }
+}
+
+Truth truth_of(const EvaluateOptions& options) {
+  if (options.truth.empty()) return {};
+  Truth truth = read_reference(options.truth, !options.without_landmarks);
+  if (!truth.is_known())
+    std::fprintf(stderr, "farpoint: warning: %s: no GROUND_TRUTH messages, evaluated without truth\n",
+                 options.truth.c_str());
+  return truth;
+}
+
 int run_evaluate(const EvaluateOptions& options) {
+  require_truth_for_its_options(options);
   const EvaluationOptions evaluation = to_evaluation_options(options);
-  const Truth truth = read_truth(options.truth, !options.without_landmarks);
+  const Truth truth = truth_of(options);
   std::vector<RunMetrics> runs;
   for (const std::string& file : options.runs)
     runs.push_back(evaluate_run(read_run(file), truth, evaluation));
@@ -114,10 +133,11 @@ int run_evaluate(const EvaluateOptions& options) {
 
 void add_evaluate_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<EvaluateOptions>();
-  CLI::App* command = app->add_subcommand("evaluate", "Say how good runs are against truth, side by side");
+  CLI::App* command = app->add_subcommand("evaluate", "Say how good runs are, against truth or by themselves");
   command->add_option("RUN", options->runs, "Output logs of farpointd, or TUM trajectory files")->required();
-  command->add_option("--truth", options->truth, "The recording (LCM log with GROUND_TRUTH), or a TUM file")
-      ->required();
+  command->add_option("--truth", options->truth,
+                      "The recording (LCM log with GROUND_TRUTH), or a TUM file. Without it: validity, losses,\n"
+                      "path length, counts and times, no errors");
   command
       ->add_option(
           "--align", options->align,
@@ -163,10 +183,15 @@ void add_evaluate_command(CLI::App* app, Action* action) {
       "  RPE    over 100, 200 .. 800 m of path, and over one second (truth interpolated)\n"
       "  depth  when a point was made; distance: over all observations of the final map; metres by the "
       "alignment\n"
+      "  points landmarks with a depth, of the map with most frames; 'all maps' counts every map's, and virtual\n"
+      "         map points (landmarks without a depth) apart. depth counts those with a sigma under 30 %\n"
       "  VMP %  points made through a virtual map point, of all points made\n"
+      "  blind  longest time without a new valid pose after the first one; path: the estimate's own length, in\n"
+      "         map units where the scale is unknown\n"
       "  landmarks  against a simulated recording's world: distance from the camera that first saw each, in\n"
       "         metres by the scale of the six seconds around; error/claim is 1 where sigmas are honest\n"
       "Examples:\n"
+      "  farpoint evaluate run.lcm\n"
       "  farpoint evaluate run.lcm --truth kitti03.lcm\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --segments 0:70,110:400\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --expect 'vmp.ate <= 1.03 baseline.ate' "
