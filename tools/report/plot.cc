@@ -167,19 +167,18 @@ const Plot::Layer* Plot::coloured_layer() const {
   return nullptr;
 }
 
+double Plot::width_px() const {
+  return frame_.width_px - kLeft_px - kRight_px;
+}
+
 int Plot::legend_columns() const {
   std::size_t longest = 0;
   for (const Layer* layer : named_layers()) longest = std::max(longest, layer->name.size());
-  return kLegendLine_px + kLetter_px * static_cast<double>(longest) < 0.5 * area_px().x() ? 2 : 1;
+  return kLegendLine_px + kLetter_px * static_cast<double>(longest) < 0.5 * width_px() ? 2 : 1;
 }
 
 double Plot::legend_px() const {
-  // Not by area_px(), which needs this.
-  std::size_t longest = 0;
-  for (const Layer* layer : named_layers()) longest = std::max(longest, layer->name.size());
-  const double half_px = 0.5 * (frame_.width_px - kLeft_px - kRight_px);
-  const double columns = kLegendLine_px + kLetter_px * static_cast<double>(longest) < half_px ? 2.0 : 1.0;
-  double rows = std::ceil(static_cast<double>(named_layers().size()) / columns);
+  double rows = std::ceil(static_cast<double>(named_layers().size()) / legend_columns());
   if (coloured_layer() != nullptr) rows += 2.0;
   return rows > 0.0 ? kLegendRow_px * rows + 4.0 : 0.0;
 }
@@ -189,7 +188,7 @@ Eigen::Vector2d Plot::corner_px() const {
 }
 
 Eigen::Vector2d Plot::area_px() const {
-  return {frame_.width_px - kLeft_px - kRight_px, frame_.height_px - kTop_px - kBottom_px - legend_px()};
+  return {width_px(), frame_.height_px - kTop_px - kBottom_px - legend_px()};
 }
 
 Eigen::Vector2d Plot::place(const Scales& scales, const Eigen::Vector2d& p) const {
@@ -314,7 +313,7 @@ void Plot::draw_colour_bar(const Layer& layer, double top_px, Svg* svg) const {
 void Plot::draw_legend(Svg* svg) const {
   double top = frame_.height_px - legend_px() + 10.0;
   const int columns = legend_columns();
-  const double room_px = area_px().x() / columns;
+  const double room_px = width_px() / columns;
   int n = 0;
   for (const Layer* layer : named_layers()) {
     const Eigen::Vector2d at(kLeft_px + (n % columns) * room_px, top + (n / columns) * kLegendRow_px);

@@ -85,6 +85,7 @@ class Plot {
   [[nodiscard]] Eigen::Vector2d place(const Scales& scales, const Eigen::Vector2d& p) const;
   [[nodiscard]] std::vector<const Layer*> named_layers() const;
   [[nodiscard]] const Layer* coloured_layer() const;
+  [[nodiscard]] double width_px() const;  // between the axes
   [[nodiscard]] int legend_columns() const;
   [[nodiscard]] double legend_px() const;
   [[nodiscard]] Eigen::Vector2d corner_px() const;  // of the area between the axes
