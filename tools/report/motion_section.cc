@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 
 #include "tools/report/html.h"
@@ -34,18 +35,14 @@ std::string charts(const std::array<Component, N>& components, const std::vector
                    const std::string& unit, double start_s, double end_s) {
   std::vector<std::string> pictures;
   for (const Component& c : components) {
-    const PlotFrame frame{c.title, {"time since the first frame, s"}, {unit}, false, 520, 240};
-    Plot values(frame), errors(frame);
-    for (const Quantity& q : quantities) values.line(q.name, component_over_time(q.values, c.index, start_s, end_s), q.style);
-    PlotFrame error_frame = frame;
-    error_frame.title = c.error_title;
-    Plot error_plot(error_frame);
+    Plot values({c.title, {"time since the first frame, s"}, {unit}, false, 520, 250});
+    Plot errors({c.error_title, {"time since the first frame, s"}, {unit}, false, 520, 250});
     for (const Quantity& q : quantities) {
-      if (!q.errors.empty())
-        error_plot.line(q.name, component_over_time(q.errors, c.index, start_s, end_s), q.style);
+      values.line(q.name, component_over_time(q.values, c.index, start_s, end_s), q.style);
+      if (!q.errors.empty()) errors.line(q.name, component_over_time(q.errors, c.index, start_s, end_s), q.style);
     }
     pictures.push_back(values.svg());
-    pictures.push_back(error_plot.svg());
+    pictures.push_back(errors.svg());
   }
   return row_of(pictures);
 }
