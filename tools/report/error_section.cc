@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tools/evaluate/landmark_truth.h"
+#include "tools/evaluate/statistics.h"
 #include "tools/report/html.h"
 #include "tools/report/motion.h"
 #include "tools/report/plot.h"
@@ -76,6 +77,21 @@ std::string scale_view(const Runs& runs, const Truth& truth) {
   return plot.svg();
 }
 
+// Those over ten steps of the path: shorter ones end up to a step beyond their length.
+std::vector<double> lengths_for(const std::vector<PosePair>& pairs) {
+  constexpr double kFewestSteps = 10.0;
+  constexpr std::array kLengths_m = {1.0,   2.0,   5.0,   10.0,  20.0,  50.0,  100.0,  200.0,
+                                     300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 1000.0, 2000.0};
+  std::vector<double> steps_m, lengths_m;
+  for (std::size_t i = 1; i < pairs.size(); ++i)
+    steps_m.push_back((pairs[i].T_world_body.t - pairs[i - 1].T_world_body.t).norm());
+  const double shortest_m = kFewestSteps * percentile(std::move(steps_m), 50.0);
+  for (const double length_m : kLengths_m) {
+    if (length_m >= shortest_m) lengths_m.push_back(length_m);
+  }
+  return lengths_m;
+}
+
 struct LengthView {
   const char* title;
   const char* y_label;
@@ -84,14 +100,12 @@ struct LengthView {
 
 std::string length_view(const Runs& runs, const Truth& truth, const LengthView& view) {
   constexpr std::size_t kFewest = 5;
-  const std::vector<double> lengths_m = {1,   2,   5,   10,  20,  50,  100, 200,
-                                         300, 400, 500, 600, 700, 800, 1000, 2000};
   Plot plot({view.title, {"length of the true path, m", true}, {view.y_label, false, 0.0}, false, 520, 300});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!runs[i].metrics || !runs[i].metrics->final_metrics.absolute) continue;
     PointList points;
     const std::vector<PosePair> pairs = pair_nearest(truth_for(runs[i], truth), runs[i].run.final_trajectory);
-    for (const LengthError& e : segment_errors(pairs, runs[i].scale(), lengths_m)) {
+    for (const LengthError& e : segment_errors(pairs, runs[i].scale(), lengths_for(pairs))) {
       if (e.error.segments >= kFewest) points.emplace_back(e.length_m, e.error.*view.error);
     }
     plot.line(runs[i].name + ", final", points, run_style(i));
@@ -115,7 +129,7 @@ std::string error_section(const Runs& runs, const Truth* truth) {
   return section("Errors",
                  "Position error after alignment. Scale: six seconds of the final trajectory aligned by themselves; "
                  "where it departs from 1, the map's unit has drifted. RPE: mean over stretches of one length, begun "
-                 "at every tenth pose, where five of them fit.",
+                 "at every tenth pose, where five of them fit and one has ten poses.",
                  row_of(pictures));
 }
 
