@@ -100,11 +100,12 @@ void print_text(const std::vector<RunMetrics>& runs) {
 }
 
 void require_truth_for_its_options(const EvaluateOptions& options) {
-  const bool asks_for_truth = !options.align.empty() || options.planar || options.truth_point != "auto" ||
-                              !options.segments.empty();
+  const bool asks_for_truth =
+      !options.align.empty() || options.planar || options.truth_point != "auto" || !options.segments.empty();
   if (asks_for_truth && options.truth.empty()) {
     throw InputError(
-        "--align, --planar, --truth-point and --segments compare with truth, expected --truth FILE beside them");
+        "--align, --planar, --truth-point and --segments compare with truth, expected --truth FILE beside "
+        "them");
   }
 }
 
@@ -133,11 +134,13 @@ int run_evaluate(const EvaluateOptions& options) {
 
 void add_evaluate_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<EvaluateOptions>();
-  CLI::App* command = app->add_subcommand("evaluate", "Say how good runs are, against truth or by themselves");
+  CLI::App* command =
+      app->add_subcommand("evaluate", "Say how good runs are, against truth or by themselves");
   command->add_option("RUN", options->runs, "Output logs of farpointd, or TUM trajectory files")->required();
-  command->add_option("--truth", options->truth,
-                      "The recording (LCM log with GROUND_TRUTH), or a TUM file. Without it: validity, losses,\n"
-                      "path length, counts and times, no errors");
+  command->add_option(
+      "--truth", options->truth,
+      "The recording (LCM log with GROUND_TRUTH), or a TUM file. Without it: validity, losses,\n"
+      "path length, counts and times, no errors");
   command
       ->add_option(
           "--align", options->align,
@@ -183,10 +186,12 @@ void add_evaluate_command(CLI::App* app, Action* action) {
       "  RPE    over 100, 200 .. 800 m of path, and over one second (truth interpolated)\n"
       "  depth  when a point was made; distance: over all observations of the final map; metres by the "
       "alignment\n"
-      "  points landmarks with a depth, of the map with most frames; 'all maps' counts every map's, and virtual\n"
+      "  points landmarks with a depth, of the map with most frames; 'all maps' counts every map's, and "
+      "virtual\n"
       "         map points (landmarks without a depth) apart. depth counts those with a sigma under 30 %\n"
       "  VMP %  points made through a virtual map point, of all points made\n"
-      "  blind  longest time without a new valid pose after the first one; path: the estimate's own length, in\n"
+      "  blind  longest time without a new valid pose after the first one; path: the estimate's own length, "
+      "in\n"
       "         map units where the scale is unknown\n"
       "  landmarks  against a simulated recording's world: distance from the camera that first saw each, in\n"
       "         metres by the scale of the six seconds around; error/claim is 1 where sigmas are honest\n"

@@ -27,7 +27,8 @@ void measure_validity(const std::vector<PublishedState>& published, OwnMetrics* 
     metrics->state_percent.at(std::min(state, metrics->state_percent.size() - 1)) +=
         100.0 / static_cast<double>(published.size());
     if (last_valid_s)
-      metrics->longest_blind_s = std::max(metrics->longest_blind_s.value_or(0.0), frame.time_s - *last_valid_s);
+      metrics->longest_blind_s =
+          std::max(metrics->longest_blind_s.value_or(0.0), frame.time_s - *last_valid_s);
     if (!frame.valid) continue;
     if (!metrics->first_valid_s) metrics->first_valid_s = frame.time_s - published.front().time_s;
     last_valid_s = frame.time_s;
@@ -60,7 +61,8 @@ std::string text_of(const std::optional<std::int64_t>& value) {
 }
 
 std::string path_text(const PathMetrics& path, const char* unit) {
-  return fmt::format("poses={} posed_share={:.4f} path={:.2f} {}\n", path.poses, path.share, path.length, unit);
+  return fmt::format("poses={} posed_share={:.4f} path={:.2f} {}\n", path.poses, path.share, path.length,
+                     unit);
 }
 
 std::string states_text(const OwnMetrics& metrics) {
@@ -137,10 +139,11 @@ std::string own_text(const std::string& run, const OwnMetrics& metrics) {
   std::string text = run + " final path: " + path_text(metrics.final_path, metrics.length_unit);
   if (!metrics.live_path) return text;
   text += run + " live path:  " + path_text(*metrics.live_path, metrics.length_unit);
-  text += fmt::format("{} validity: duration_s={:.1f} first_valid_s={} longest_blind_s={} frames_dropped={} "
-                      "keyframes_dropped={}\n",
-                      run, metrics.duration_s, text_of(metrics.first_valid_s), text_of(metrics.longest_blind_s),
-                      text_of(metrics.frames_dropped), text_of(metrics.keyframes_dropped));
+  text += fmt::format(
+      "{} validity: duration_s={:.1f} first_valid_s={} longest_blind_s={} frames_dropped={} "
+      "keyframes_dropped={}\n",
+      run, metrics.duration_s, text_of(metrics.first_valid_s), text_of(metrics.longest_blind_s),
+      text_of(metrics.frames_dropped), text_of(metrics.keyframes_dropped));
   text += run + " states, % of the frames:" + states_text(metrics) + "\n";
   if (metrics.map)
     text += fmt::format("{} all maps: keyframes={} points={} vmps={}\n", run, metrics.map->keyframes,

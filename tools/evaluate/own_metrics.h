@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures of a run that need no truth: validity, losses, path length, counts of the map, drops.
 //
-// Words, here and in `report` and `top`. A landmark with a depth is a point, one without is a virtual map point
-// (VMP); landmarks are both. summary_t.landmarks and status_t.landmarks count both, of all maps;
+// Words, here and in `report` and `top`. A landmark with a depth is a point, one without is a virtual map
+// point (VMP); landmarks are both. summary_t.landmarks and status_t.landmarks count both, of all maps;
 // map_summary_t.landmarks counts the points of one map.
 #pragma once
 

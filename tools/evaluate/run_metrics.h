@@ -125,7 +125,8 @@ struct RunMetrics {
   std::optional<LandmarkMetrics> landmarks;  // their figures
 };
 
-// An unknown truth gives the figures that need none. Throws InputError for options that the truth cannot serve.
+// An unknown truth gives the figures that need none. Throws InputError for options that the truth cannot
+// serve.
 [[nodiscard]] RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options);
 
 // Every figure by name; absent ones are null. The absolute error has the key names of the field's scripts.

@@ -9,8 +9,8 @@
 
 namespace farpoint::tools {
 
-// Lines `NAME final: n=.. share=.. ...` and `NAME live: ...` and so on, one fact a key; without truth those that
-// need none.
+// Lines `NAME final: n=.. share=.. ...` and `NAME live: ...` and so on, one fact a key; without truth those
+// that need none.
 [[nodiscard]] std::string details_text(const RunMetrics& metrics);
 
 // Two header lines and one row a run, in the given order; the last line is the last run's. Runs without truth

@@ -28,8 +28,8 @@ struct Scale {
 // do not count.
 [[nodiscard]] Scale scale_around(const Axis& axis, const std::vector<double>& values);
 
-// Round values between two bounds, about `wanted` of them. A logarithmic axis that is too short for 1, 2, 5 has
-// those of a linear one.
+// Round values between two bounds, about `wanted` of them. A logarithmic axis that is too short for 1, 2, 5
+// has those of a linear one.
 [[nodiscard]] std::vector<double> ticks(double low, double high, int wanted, bool is_log);
 // Text of a tick, with the digits that distinguish it from its neighbour `step` away.
 [[nodiscard]] std::string tick_text(double value, double step, bool is_log);

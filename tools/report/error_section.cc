@@ -28,7 +28,8 @@ PointList over_the_way(const Trajectory& truth, const std::vector<PosePair>& pai
   return points;
 }
 
-PointList error_points(const Trajectory& truth, const Trajectory& estimate, const slam::Sim3& world_from_map) {
+PointList error_points(const Trajectory& truth, const Trajectory& estimate,
+                       const slam::Sim3& world_from_map) {
   return over_the_way(truth, pair_nearest(truth, estimate), [&](const PosePair& pair) {
     return (world_from_map * pair.T_map_body.t - pair.T_world_body.t).norm();
   });
@@ -54,12 +55,7 @@ std::string error_view(const Runs& runs, const Truth& truth) {
 // Of the final trajectory: the scale of six seconds as a share of the whole run's.
 std::string scale_view(const Runs& runs, const Truth& truth) {
   constexpr std::size_t kMostSamples = 400;
-  Plot plot({"Scale over the way",
-             {"true way, m"},
-             {"scale of six seconds / the run's"},
-             false,
-             520,
-             300});
+  Plot plot({"Scale over the way", {"true way, m"}, {"scale of six seconds / the run's"}, false, 520, 300});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!runs[i].metrics || !runs[i].metrics->final_metrics.absolute) continue;
     const Trajectory moved = truth_for(runs[i], truth);
@@ -68,10 +64,11 @@ std::string scale_view(const Runs& runs, const Truth& truth) {
     const std::size_t step = pairs.size() / kMostSamples + 1;
     for (std::size_t k = 0; k < pairs.size(); k += step) samples.push_back(pairs[k]);
     const double whole = runs[i].scale();
-    plot.line(runs[i].name + ", final", over_the_way(moved, samples, [&](const PosePair& pair) {
-                return local_scale(pairs, pair.time_s, NAN) / whole;
-              }),
-              run_style(i));
+    plot.line(
+        runs[i].name + ", final",
+        over_the_way(moved, samples,
+                     [&](const PosePair& pair) { return local_scale(pairs, pair.time_s, NAN) / whole; }),
+        run_style(i));
   }
   plot.mark_y("", 1.0, {"#777", "3 3", 1.2});
   return plot.svg();
@@ -120,17 +117,18 @@ std::string error_section(const Runs& runs, const Truth* truth) {
   std::vector<std::string> pictures = {error_view(runs, *truth), scale_view(runs, *truth)};
   if (truth->body.has_orientation) {
     pictures.push_back(length_view(runs, *truth,
-                                   {"Relative error of position (RPE) by length", "mean error, % of the length",
-                                    &SegmentError::translation_percent}));
+                                   {"Relative error of position (RPE) by length",
+                                    "mean error, % of the length", &SegmentError::translation_percent}));
     pictures.push_back(length_view(runs, *truth,
                                    {"Relative error of rotation (RPE) by length", "mean error, deg/m",
                                     &SegmentError::rotation_deg_per_m}));
   }
-  return section("Errors",
-                 "Position error after alignment. Scale: six seconds of the final trajectory aligned by themselves; "
-                 "where it departs from 1, the map's unit has drifted. RPE: mean over stretches of one length, begun "
-                 "at every tenth pose, where five of them fit and one has ten poses.",
-                 row_of(pictures));
+  return section(
+      "Errors",
+      "Position error after alignment. Scale: six seconds of the final trajectory aligned by themselves; "
+      "where it departs from 1, the map's unit has drifted. RPE: mean over stretches of one length, begun "
+      "at every tenth pose, where five of them fit and one has ten poses.",
+      row_of(pictures));
 }
 
 }  // namespace farpoint::tools::report

@@ -52,8 +52,8 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
 
 std::string page(const std::string& title, const std::string& body) {
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escaped(title) +
-         "</title><style>" + kStyle + "</style></head><body>\n<h1>" + escaped(title) + "</h1>\n<p id=\"hint\"></p>\n" +
-         body + "<script>" + page_script() + "</script>\n</body></html>\n";
+         "</title><style>" + kStyle + "</style></head><body>\n<h1>" + escaped(title) +
+         "</h1>\n<p id=\"hint\"></p>\n" + body + "<script>" + page_script() + "</script>\n</body></html>\n";
 }
 
 }  // namespace farpoint::tools::report

@@ -131,9 +131,9 @@ std::vector<Eigen::Vector2d> component_over_time(const std::vector<TimedVector>&
   const TimedVector* before = nullptr;
   for (const TimedVector& v : vectors) {
     if (v.time_s < start_s || v.time_s > end_s) continue;
-    const bool is_apart = before != nullptr && (v.time_s - before->time_s > longest_s ||
-                                                std::abs(v.value[component] - before->value[component]) >
-                                                    kHalfTurn_deg);
+    const bool is_apart =
+        before != nullptr && (v.time_s - before->time_s > longest_s ||
+                              std::abs(v.value[component] - before->value[component]) > kHalfTurn_deg);
     if (is_apart) points.push_back(line_break());
     points.emplace_back(v.time_s - start_s, v.value[component]);
     before = &v;

@@ -39,7 +39,8 @@ struct TimedVector {
 [[nodiscard]] Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Quaterniond& q);
 [[nodiscard]] std::vector<TimedVector> attitudes_deg(const Trajectory& trajectory);
 // Rotation from truth to estimate about the body's axes, degrees.
-[[nodiscard]] std::vector<TimedVector> attitude_errors_deg(const Trajectory& truth, const Trajectory& estimate);
+[[nodiscard]] std::vector<TimedVector> attitude_errors_deg(const Trajectory& truth,
+                                                           const Trajectory& estimate);
 
 // Of the body in its axes, from poses a tenth of a second before and after; without orientation in the
 // trajectory's axes.
@@ -48,8 +49,8 @@ struct TimedVector {
 [[nodiscard]] std::vector<TimedVector> differences(const std::vector<TimedVector>& truth,
                                                    const std::vector<TimedVector>& estimate);
 
-// One component over the time since start_s, between the two times; breaks where values are missing or an angle
-// jumps by more than half a turn.
+// One component over the time since start_s, between the two times; breaks where values are missing or an
+// angle jumps by more than half a turn.
 [[nodiscard]] std::vector<Eigen::Vector2d> component_over_time(const std::vector<TimedVector>& vectors,
                                                                int component, double start_s, double end_s);
 

@@ -22,8 +22,8 @@ struct Component {
   const char* title;
   const char* error_title;
 };
-constexpr std::array kAngles = {Component{0, "Roll", "Error of roll"}, Component{1, "Pitch", "Error of pitch"},
-                                Component{2, "Yaw", "Error of yaw"}};
+constexpr std::array kAngles = {Component{0, "Roll", "Error of roll"},
+                                Component{1, "Pitch", "Error of pitch"}, Component{2, "Yaw", "Error of yaw"}};
 constexpr std::array kVelocities = {Component{0, "Forward velocity", "Error of forward velocity"},
                                     Component{1, "Velocity to the left", "Error of velocity to the left"},
                                     Component{2, "Velocity upwards", "Error of velocity upwards"}};
@@ -39,7 +39,8 @@ std::string charts(const std::array<Component, N>& components, const std::vector
     Plot errors({c.error_title, {"time since the first frame, s"}, {unit}, false, 520, 250});
     for (const Quantity& q : quantities) {
       values.line(q.name, component_over_time(q.values, c.index, start_s, end_s), q.style);
-      if (!q.errors.empty()) errors.line(q.name, component_over_time(q.errors, c.index, start_s, end_s), q.style);
+      if (!q.errors.empty())
+        errors.line(q.name, component_over_time(q.errors, c.index, start_s, end_s), q.style);
     }
     pictures.push_back(values.svg());
     pictures.push_back(errors.svg());
@@ -53,13 +54,15 @@ std::vector<Quantity> attitudes(const Runs& runs, const Truth* truth) {
   if (has_truth) quantities.push_back({attitudes_deg(truth->body), {}, "truth", truth_style()});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const auto add = [&](const Trajectory& in_world, const char* which, const Style& style) {
-      quantities.push_back({attitudes_deg(in_world),
-                            has_truth ? attitude_errors_deg(truth->body, in_world) : std::vector<TimedVector>{},
-                            runs[i].name + which, style});
+      quantities.push_back(
+          {attitudes_deg(in_world),
+           has_truth ? attitude_errors_deg(truth->body, in_world) : std::vector<TimedVector>{},
+           runs[i].name + which, style});
     };
     add(moved_by(runs[i].world_from_map(), runs[i].run.final_trajectory), ", final", run_style(i));
     if (runs[i].run.log)
-      add(moved_by(runs[i].world_from_live_map(), runs[i].run.log->live_trajectory), ", live", thin_run_style(i));
+      add(moved_by(runs[i].world_from_live_map(), runs[i].run.log->live_trajectory), ", live",
+          thin_run_style(i));
   }
   return quantities;
 }
@@ -101,11 +104,14 @@ std::string motion_section(const Runs& runs, const Truth* truth) {
   content += as_speed ? charts(kSpeeds, moving, unit, runs[0].start_s, end_s)
                       : charts(kVelocities, moving, unit, runs[0].start_s, end_s);
   std::string how =
-      "Roll, pitch and yaw turn the world's axes into the body's, about z, then y, then x. Velocities are in body "
+      "Roll, pitch and yaw turn the world's axes into the body's, about z, then y, then x. Velocities are in "
+      "body "
       "axes, as published.";
   if (truth != nullptr)
-    how += " An error of attitude is the rotation from truth to estimate about the body's axes, after alignment of "
-           "the positions. True velocities are differences of true positions over 0.2 s.";
+    how +=
+        " An error of attitude is the rotation from truth to estimate about the body's axes, after alignment "
+        "of "
+        "the positions. True velocities are differences of true positions over 0.2 s.";
   return section("Attitude and velocity", how, content);
 }
 

@@ -144,7 +144,9 @@ Plot::Scales Plot::scales() const {
 }
 
 bool Plot::shows_something(const Scales& scales) const {
-  const auto is_inside = [&](const Eigen::Vector2d& p) { return scales.x.holds(p.x()) && scales.y.holds(p.y()); };
+  const auto is_inside = [&](const Eigen::Vector2d& p) {
+    return scales.x.holds(p.x()) && scales.y.holds(p.y());
+  };
   return std::any_of(layers_.begin(), layers_.end(), [&](const Layer& layer) {
     if (layer.kind == Kind::kMarkX || layer.kind == Kind::kMarkY || layer.kind == Kind::kLabel) return false;
     const auto inside = std::count_if(layer.points.begin(), layer.points.end(), is_inside);
@@ -193,7 +195,8 @@ Eigen::Vector2d Plot::area_px() const {
 
 Eigen::Vector2d Plot::place(const Scales& scales, const Eigen::Vector2d& p) const {
   // Kept within reason: far outside the area numbers would only get long.
-  const double u = std::clamp(scales.x.share(p.x()), -2.0, 3.0), v = std::clamp(scales.y.share(p.y()), -2.0, 3.0);
+  const double u = std::clamp(scales.x.share(p.x()), -2.0, 3.0),
+               v = std::clamp(scales.y.share(p.y()), -2.0, 3.0);
   return corner_px() + Eigen::Vector2d(u * area_px().x(), (1.0 - v) * area_px().y());
 }
 
@@ -242,7 +245,8 @@ void Plot::draw_coloured(const Layer& layer, const Scales& scales, Svg* svg) con
   std::vector<Eigen::Vector2d> piece;
   int level = 0;
   const auto finish = [&] {
-    svg->polyline(piece, stroke({level_colour(level), "", layer.style.width_px}) + " stroke-linecap=\"round\"");
+    svg->polyline(piece,
+                  stroke({level_colour(level), "", layer.style.width_px}) + " stroke-linecap=\"round\"");
     piece.clear();
   };
   for (std::size_t i = 0; i < std::min(layer.points.size(), layer.colours.values.size()); ++i) {

@@ -95,7 +95,8 @@ class Plot {
   std::vector<Layer> layers_;
 };
 
-// At most about `most` of a line's points: of each stretch the first, the lowest and the highest, and a break.
+// At most about `most` of a line's points: of each stretch the first, the lowest and the highest, and a
+// break.
 [[nodiscard]] std::vector<Eigen::Vector2d> thinned(const std::vector<Eigen::Vector2d>& points,
                                                    std::size_t most);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/report/run_record.h"
 
+#include <algorithm>
 #include <map>
 
 #include "ipc/channels.h"
@@ -90,6 +91,10 @@ slam::Sim3 RunRecord::world_from_map() const {
 slam::Sim3 RunRecord::world_from_live_map() const {
   if (!metrics || !metrics->live_metrics || !metrics->live_metrics->absolute) return {};
   return metrics->live_metrics->absolute->map_to_world.S_world_map;
+}
+
+bool RunRecord::is_threaded() const {
+  return std::any_of(timings.begin(), timings.end(), [](const timing_t& t) { return t.latency_ms >= 0.0; });
 }
 
 double RunRecord::end_s() const {

@@ -26,8 +26,8 @@ struct PublishedFrame {
 // Velocity as it was published, in body axes.
 struct PublishedVelocity {
   double time_s = 0.0;
-  Eigen::Vector3d linear;    // map units a second
-  Eigen::Vector3d angular;   // rad/s
+  Eigen::Vector3d linear;   // map units a second
+  Eigen::Vector3d angular;  // rad/s
 };
 
 struct RunRecord {
@@ -49,7 +49,8 @@ struct RunRecord {
   // Map coordinates to the world's, by the final and by the live trajectory; identity without truth.
   [[nodiscard]] slam::Sim3 world_from_map() const;
   [[nodiscard]] slam::Sim3 world_from_live_map() const;
-  [[nodiscard]] double end_s() const;  // of the last frame published; start_s without one
+  [[nodiscard]] bool is_threaded() const;  // in lockstep no frame has a latency
+  [[nodiscard]] double end_s() const;      // of the last frame published; start_s without one
   [[nodiscard]] std::string length_unit() const;
 };
 

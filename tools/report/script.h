@@ -5,9 +5,9 @@
 
 namespace farpoint::tools::report {
 
-// JavaScript without the character '<', so that it stands in the page as it is. It reads what Plot::svg() writes:
-// data-x and data-y (`low high log|linear`) of a drawing, the group `ticks`, the inner drawing `area`, and
-// data-name of its lines.
+// JavaScript without the character '<', so that it stands in the page as it is. It reads what Plot::svg()
+// writes: data-x and data-y (`low high log|linear`) of a drawing, the group `ticks`, the inner drawing
+// `area`, and data-name of its lines.
 [[nodiscard]] const char* page_script();
 
 }  // namespace farpoint::tools::report

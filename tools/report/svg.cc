@@ -127,10 +127,10 @@ void Svg::jpeg(const std::vector<std::uint8_t>& bytes, double width_px, double h
 
 // A drawing within the drawing, which cuts off by itself: clip paths would need ids that the page has once.
 void Svg::begin_clip(const Eigen::Vector2d& corner, const Eigen::Vector2d& size) {
-  body_ +=
-      joined({"<svg class=\"area\" preserveAspectRatio=\"none\"", attribute("x", corner.x()), attribute("y", corner.y()), attribute("width", size.x()),
-              attribute("height", size.y()), " viewBox=\"", number(corner.x(), 1), " ", number(corner.y(), 1),
-              " ", number(size.x(), 1), " ", number(size.y(), 1), "\">\n"});
+  body_ += joined({"<svg class=\"area\" preserveAspectRatio=\"none\"", attribute("x", corner.x()),
+                   attribute("y", corner.y()), attribute("width", size.x()), attribute("height", size.y()),
+                   " viewBox=\"", number(corner.x(), 1), " ", number(corner.y(), 1), " ", number(size.x(), 1),
+                   " ", number(size.y(), 1), "\">\n"});
 }
 
 void Svg::begin_group(std::string_view attributes) {
@@ -148,8 +148,8 @@ void Svg::end_clip() {
 std::string Svg::finish(std::string_view title, std::string_view attributes) const {
   const std::string width = number(width_px_, 0), height = number(height_px_, 0);
   return joined({"<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"", width, "\" height=\"",
-                 height, "\" viewBox=\"0 0 ", width, " ", height, "\"", attributes, "><title>", escaped(title), "</title>\n",
-                 body_, "</svg>\n"});
+                 height, "\" viewBox=\"0 0 ", width, " ", height, "\"", attributes, "><title>",
+                 escaped(title), "</title>\n", body_, "</svg>\n"});
 }
 
 }  // namespace farpoint::tools::report

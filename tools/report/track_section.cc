@@ -53,7 +53,7 @@ std::int64_t nearest_time(const SightingsByTime& sightings, std::int64_t utime) 
   const auto before = std::prev(later);
   if (later == sightings.end()) return before->first;
   return seconds_between(before->first, utime) <= seconds_between(utime, later->first) ? before->first
-                                                                                      : later->first;
+                                                                                       : later->first;
 }
 
 SightingsByTime common_to(const std::vector<SightingsByTime>& runs) {
@@ -172,10 +172,11 @@ std::string legend(bool with_far) {
     std::string text;
   };
   const std::string far = "beyond " + number(kFar_m, 0) + " m";
-  const std::vector<Entry> entries = {{false, false, with_far ? "within " + number(kFar_m, 0) + " m" : "point"},
-                                      {false, true, "made through a virtual map point"},
-                                      {true, false, far},
-                                      {true, true, far + ", made through a virtual map point"}};
+  const std::vector<Entry> entries = {
+      {false, false, with_far ? "within " + number(kFar_m, 0) + " m" : "point"},
+      {false, true, "made through a virtual map point"},
+      {true, false, far},
+      {true, true, far + ", made through a virtual map point"}};
   Svg svg(1080, 26);
   double x = 8;
   for (const Entry& entry : entries) {
@@ -222,10 +223,11 @@ std::string track_section(const Runs& runs, const std::filesystem::path& recordi
   std::string pictures;
   for (const Instant& instant : instants) pictures += pictures_of(shown, instant, images);
   if (pictures.empty()) return {};
-  return section("Feature tracks",
-                 "Points of the final map where keyframes saw them, with their last sightings. Runs of one instant "
-                 "stand together: a keyframe that all of them have, or each run's nearest.",
-                 row_of({legend(with_far)}) + pictures);
+  return section(
+      "Feature tracks",
+      "Points of the final map where keyframes saw them, with their last sightings. Runs of one instant "
+      "stand together: a keyframe that all of them have, or each run's nearest.",
+      row_of({legend(with_far)}) + pictures);
 }
 
 }  // namespace farpoint::tools::report

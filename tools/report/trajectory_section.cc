@@ -50,7 +50,8 @@ std::string height_view(const Runs& runs, const Truth* truth, const std::string&
     plot.line(name, points, style);
   };
   if (truth != nullptr) add("truth", truth_for(runs[0], *truth), truth_style());
-  for (std::size_t i = 0; i < runs.size(); ++i) add(runs[i].name + ", final", final_in_world(runs[i]), run_style(i));
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    add(runs[i].name + ", final", final_in_world(runs[i]), run_style(i));
   return plot.svg();
 }
 
@@ -98,7 +99,8 @@ std::string trajectory_section(const Runs& runs, const Truth* truth) {
       truth == nullptr
           ? "Each run in its own map frame: there is no truth to align it with. final: after the last "
             "optimisation; live: as published, where it is of the same map."
-          : "Runs aligned with truth; the live trajectory is aligned by itself. Gaps: no valid pose, or another "
+          : "Runs aligned with truth; the live trajectory is aligned by itself. Gaps: no valid pose, or "
+            "another "
             "map. start: the first pose of the first run.";
   return section("Trajectory", how, row_of(pictures));
 }
