@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/report/report.h"
 
+#include "tools/report/frame_table.h"
 #include "tools/report/html.h"
 #include "tools/report/sections.h"
 #include "tools/report/svg.h"
@@ -18,7 +19,7 @@ std::string truth_text(const ReportRequest& request, const Truth& truth) {
 
 }  // namespace
 
-std::string make_report(const ReportRequest& request) {
+Report make_report(const ReportRequest& request) {
   const Truth truth = request.truth.empty() ? Truth{} : read_reference(request.truth, true);
   const Truth* known = truth.is_known() ? &truth : nullptr;
   Runs runs;
@@ -32,7 +33,9 @@ std::string make_report(const ReportRequest& request) {
           motion_section(runs, known) + landmark_section(runs) + vmp_section(runs) + map_section(runs) +
           track_section(runs, request.truth) + timing_section(runs) + workload_section(runs) +
           health_section(runs) + configuration_section(runs);
-  return page("Farpoint: " + names, body);
+  Report report{page("Farpoint: " + names, body), {}};
+  for (const RunRecord& run : runs) report.tables.push_back({run.name, frame_table(run, known)});
+  return report;
 }
 
 Json make_figures(const std::vector<std::filesystem::path>& runs) {
