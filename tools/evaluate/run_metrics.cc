@@ -104,7 +104,7 @@ std::optional<double> metres_a_unit(const RunMetrics& metrics, std::int8_t scale
   return 1.0;
 }
 
-void add_summary(const summary_t& summary, RunMetrics* metrics) {
+void add_summary(const summary_t& summary, std::int8_t scale_state, RunMetrics* metrics) {
   if (summary.frames > 0) {
     metrics->tracked_percent =
         100.0 * static_cast<double>(summary.frames_valid) / static_cast<double>(summary.frames);
@@ -117,7 +117,7 @@ void add_summary(const summary_t& summary, RunMetrics* metrics) {
   }
   if (summary.maps.empty()) return;
   metrics->map_points = summary.maps[0].landmarks;
-  if (const std::optional<double> scale = metres_a_unit(*metrics, summary.scale_state))
+  if (const std::optional<double> scale = metres_a_unit(*metrics, scale_state))
     metrics->depth = depth_metrics(summary.maps[0], *scale);
 }
 
@@ -307,7 +307,7 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
     metrics.peak_resident_mb = 1e-6 * static_cast<double>(run.log->peak_resident_bytes);
   metrics.latency = measure_latency(run.log->timed_frames);
   metrics.steadiness = measure_steadiness(run.log->timed_frames);
-  if (run.log->summary) add_summary(*run.log->summary, &metrics);
+  if (run.log->summary) add_summary(*run.log->summary, run.log->scale_state, &metrics);
   if (truth.world) add_landmarks(*run.log, truth_at_point, truth.world.get(), &metrics);
   return metrics;
 }

@@ -37,7 +37,8 @@ std::vector<Eigen::Vector2d> all_else_ms(const RunRecord& run) {
   for (std::size_t i = 1; i < run.timings.size(); ++i) {
     const timing_t& t = run.timings[i];
     double ms = 1e3 * (t.process_cpu_s - run.timings[i - 1].process_cpu_s);
-    for (const int stage : {timing_t::STAGE_DECODE, timing_t::STAGE_TRACKING, timing_t::STAGE_OUTPUT})
+    for (const int stage :
+         std::array<int, 3>{timing_t::STAGE_DECODE, timing_t::STAGE_TRACKING, timing_t::STAGE_OUTPUT})
       ms -= std::max(t.cpu_ms[stage], 0.0);
     points.emplace_back(seconds_of(t.utime) - run.start_s, std::max(ms, 0.0));
   }
