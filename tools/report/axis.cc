@@ -36,7 +36,7 @@ bool Scale::holds(double value) const {
   return value >= low && value <= high;  // NaN: false
 }
 
-Scale scale_around(const Axis& axis, const std::vector<double>& values) {
+Scale scale_around(const Axis& axis, const std::vector<double>& values, bool from_zero) {
   double low = 1e300, high = -1e300;
   for (const double value : values) {
     if (!std::isfinite(value) || (axis.is_log && value <= 0.0)) continue;
@@ -49,8 +49,7 @@ Scale scale_around(const Axis& axis, const std::vector<double>& values) {
     if (narrow) high = 2.0 * low;
   } else {
     const double margin = narrow ? 0.5 : 0.04 * (high - low);
-    // Where the data begin at zero, so does the axis.
-    low = low >= 0.0 && low < 0.3 * high ? 0.0 : low - margin;
+    low = from_zero && low >= 0.0 && low < 0.3 * high ? 0.0 : low - margin;
     high += margin;
   }
   return {axis.low.value_or(low), axis.high.value_or(high), axis.is_log};

@@ -25,8 +25,8 @@ struct Scale {
 };
 
 // Range of an axis around the given values; those that are not finite, or not positive on a logarithmic axis,
-// do not count.
-[[nodiscard]] Scale scale_around(const Axis& axis, const std::vector<double>& values);
+// do not count. from_zero: a linear axis of values that are not negative begins at zero if they come near it.
+[[nodiscard]] Scale scale_around(const Axis& axis, const std::vector<double>& values, bool from_zero);
 
 // Round values between two bounds, about `wanted` of them. A logarithmic axis that is too short for 1, 2, 5
 // has those of a linear one.

@@ -11,7 +11,7 @@ constexpr char kStyle[] = R"(
 body{font:14px/1.45 "DejaVu Sans",Arial,Helvetica,sans-serif;color:#111;background:#fff;margin:24px auto;max-width:1120px;padding:0 16px}
 h1{font-size:24px;margin:0 0 4px}h2{font-size:18px;margin:34px 0 4px;border-bottom:2px solid #333}
 p{margin:4px 0 10px;max-width:900px}.row{display:flex;flex-wrap:wrap;gap:14px;align-items:flex-start}
-svg{font:12px "DejaVu Sans",Arial,Helvetica,sans-serif;max-width:100%;height:auto}svg svg{overflow:hidden}
+svg{font:12px "DejaVu Sans",Arial,Helvetica,sans-serif}svg[role=img]{max-width:100%;height:auto}svg svg{overflow:hidden}
 svg path{fill:none}.area polyline,.area line,.area path,.area rect{vector-effect:non-scaling-stroke}
 .cursor{stroke:#555;stroke-width:1;stroke-dasharray:2 2}.chosen{fill:#0b3c78;fill-opacity:.12;stroke:#0b3c78}
 .mark{font-weight:bold;paint-order:stroke;stroke:#fff;stroke-width:3px}[data-x]{touch-action:pan-y;user-select:none}

@@ -130,7 +130,8 @@ Plot::Scales Plot::scales() const {
       ys.push_back(p.y());
     }
   }
-  Scales scales{scale_around(frame_.x, xs), scale_around(frame_.y, ys)};
+  Scales scales{scale_around(frame_.x, xs, !frame_.equal_units),
+                scale_around(frame_.y, ys, !frame_.equal_units)};
   if (!frame_.equal_units) return scales;
   // The axis with room to spare is widened.
   const double x_unit = (scales.x.high - scales.x.low) / area_px().x(),
