@@ -28,7 +28,7 @@ std::string range_attribute(const char* name, const Scale& scale) {
          (scale.is_log ? " log\"" : " linear\"");
 }
 
-// A name that fits into so many pixels.
+// Cuts a name to the given width.
 std::string shortened(const std::string& text, double room_px) {
   const auto most = static_cast<std::size_t>(std::max(room_px / kLetter_px, 8.0));
   return text.size() <= most ? text : text.substr(0, most - 2) + "..";
