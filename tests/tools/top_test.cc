@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <pty.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -246,8 +245,7 @@ TEST(Top, LeavesWhenQIsPressed) {
   }
   close(terminal);
   int status = -1;
-  rusage used{};
-  ASSERT_EQ(wait4(child, &status, 0, &used), child);
+  ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << seen;
   EXPECT_TRUE(pressed) << seen;
   EXPECT_LT(std::count(seen.begin(), seen.end(), 'H'), 60) << "29 s of pictures more";
