@@ -181,7 +181,7 @@ TEST_F(RunWithoutTruth, JsonOfARunWithTruthKeepsItsKeysInOrder) {
                           "segments",
                           "compared_with_truth",
                           "own"}) {
-    const std::size_t found = text.find("\"" + std::string(key) + "\":", at);
+    const std::size_t found = text.find(std::string(1, '"').append(key).append("\":"), at);
     ASSERT_NE(found, std::string::npos) << key << " in " << text;
     at = found;
   }

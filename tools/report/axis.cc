@@ -46,7 +46,9 @@ Scale scale_around(const Axis& axis, const std::vector<double>& values, bool fro
   if (low > high) low = axis.is_log ? 1.0 : 0.0, high = axis.is_log ? 10.0 : 1.0;
   const bool narrow = high - low < 1e-9 * std::max(1.0, std::abs(high));
   if (axis.is_log) {
-    if (narrow) high = 2.0 * low;
+    constexpr double kMargin = 1.08;
+    low /= narrow ? 2.0 : kMargin;
+    high *= narrow ? 2.0 : kMargin;
   } else {
     const double margin = narrow ? 0.5 : 0.04 * (high - low);
     low = from_zero && low >= 0.0 && low < 0.3 * high ? 0.0 : low - margin;
@@ -60,6 +62,7 @@ std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
   if (is_log) {
     std::vector<double> values = decade_ticks(low, high);
     if (values.size() >= kFewest) return values;
+    wanted *= 2;  // they crowd at the upper end
   }
   std::vector<double> values;
   const double raw = (high - low) / wanted, power = std::pow(10.0, std::floor(std::log10(raw)));

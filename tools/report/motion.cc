@@ -82,6 +82,26 @@ std::vector<TimedVector> attitudes_deg(const Trajectory& trajectory) {
   return attitudes;
 }
 
+Eigen::Vector3d mean_angles_deg(const std::vector<TimedVector>& angles_deg) {
+  Eigen::Vector3d sines = Eigen::Vector3d::Zero(), cosines = Eigen::Vector3d::Zero(), means;
+  for (const TimedVector& a : angles_deg) {
+    sines += (a.value / kDegreesPerRadian).array().sin().matrix();
+    cosines += (a.value / kDegreesPerRadian).array().cos().matrix();
+  }
+  for (int i = 0; i < 3; ++i) means[i] = kDegreesPerRadian * std::atan2(sines[i], cosines[i]);
+  return means;
+}
+
+std::vector<TimedVector> angles_around(const Eigen::Vector3d& centre_deg,
+                                       std::vector<TimedVector> angles_deg) {
+  constexpr double kTurn_deg = 360.0;
+  for (TimedVector& a : angles_deg) {
+    for (int i = 0; i < 3; ++i)
+      a.value[i] = centre_deg[i] + std::remainder(a.value[i] - centre_deg[i], kTurn_deg);
+  }
+  return angles_deg;
+}
+
 std::vector<TimedVector> attitude_errors_deg(const Trajectory& truth, const Trajectory& estimate) {
   std::vector<TimedVector> errors;
   for (const PosePair& pair : pair_interpolated(truth, estimate)) {

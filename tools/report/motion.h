@@ -38,6 +38,11 @@ struct TimedVector {
 // Roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll), degrees, REP-103 axes.
 [[nodiscard]] Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Quaterniond& q);
 [[nodiscard]] std::vector<TimedVector> attitudes_deg(const Trajectory& trajectory);
+// The mean direction of each component's angles, degrees.
+[[nodiscard]] Eigen::Vector3d mean_angles_deg(const std::vector<TimedVector>& angles_deg);
+// The same angles, each component within half a turn of the centre's.
+[[nodiscard]] std::vector<TimedVector> angles_around(const Eigen::Vector3d& centre_deg,
+                                                     std::vector<TimedVector> angles_deg);
 // Rotation from truth to estimate about the body's axes, degrees.
 [[nodiscard]] std::vector<TimedVector> attitude_errors_deg(const Trajectory& truth,
                                                            const Trajectory& estimate);

@@ -35,8 +35,8 @@ std::string charts(const std::array<Component, N>& components, const std::vector
                    const std::string& unit, double start_s, double end_s) {
   std::vector<std::string> pictures;
   for (const Component& c : components) {
-    Plot values({c.title, {"time since the first frame, s"}, {unit}, false, 520, 250});
-    Plot errors({c.error_title, {"time since the first frame, s"}, {unit}, false, 520, 250});
+    Plot values({c.title, {"time since the first frame, s"}, {unit}, false, 520, 280});
+    Plot errors({c.error_title, {"time since the first frame, s"}, {unit}, false, 520, 280});
     for (const Quantity& q : quantities) {
       values.line(q.name, component_over_time(q.values, c.index, start_s, end_s), q.style);
       if (!q.errors.empty())
@@ -48,6 +48,7 @@ std::string charts(const std::array<Component, N>& components, const std::vector
   return row_of(pictures);
 }
 
+// Angles within half a turn of the first curve's mean, so that one about 180 degrees does not jump.
 std::vector<Quantity> attitudes(const Runs& runs, const Truth* truth) {
   std::vector<Quantity> quantities;
   const bool has_truth = truth != nullptr && truth->body.has_orientation;
@@ -64,6 +65,8 @@ std::vector<Quantity> attitudes(const Runs& runs, const Truth* truth) {
       add(moved_by(runs[i].world_from_live_map(), runs[i].run.log->live_trajectory), ", live",
           thin_run_style(i));
   }
+  const Eigen::Vector3d centre_deg = mean_angles_deg(quantities.front().values);
+  for (Quantity& q : quantities) q.values = angles_around(centre_deg, std::move(q.values));
   return quantities;
 }
 

@@ -285,7 +285,9 @@ void Plot::draw_layer(const Layer& layer, const Scales& scales, Svg* svg) const 
       if (!layer.points[0].allFinite()) return;
       const Eigen::Vector2d at = place(scales, layer.points[0]);
       svg->circle(at, 5.0, "fill=\"#fff\" " + stroke(layer.style));
-      return svg->text(at + Eigen::Vector2d(9, -6), layer.name, Anchor::kStart, "class=\"mark\"");
+      const bool is_right = at.x() + kLetter_px * static_cast<double>(layer.name.size()) + 12.0 > end.x();
+      return svg->text(at + Eigen::Vector2d(is_right ? -9 : 9, at.y() < corner.y() + 20.0 ? 16 : -6),
+                       layer.name, is_right ? Anchor::kEnd : Anchor::kStart, "class=\"mark\"");
     }
     case Kind::kDots: {
       std::vector<Eigen::Vector2d> points;

@@ -172,11 +172,11 @@ std::string legend(bool with_far) {
     std::string text;
   };
   const std::string far = "beyond " + number(kFar_m, 0) + " m";
-  const std::vector<Entry> entries = {
-      {false, false, with_far ? "within " + number(kFar_m, 0) + " m" : "point"},
-      {false, true, "made through a virtual map point"},
-      {true, false, far},
-      {true, true, far + ", made through a virtual map point"}};
+  const std::string near = with_far ? "within " + number(kFar_m, 0) + " m" : "point";
+  const std::vector<Entry> entries = {{false, false, near},
+                                      {false, true, near + ", made through a virtual map point"},
+                                      {true, false, far},
+                                      {true, true, far + ", made through a virtual map point"}};
   Svg svg(1080, 26);
   double x = 8;
   for (const Entry& entry : entries) {
@@ -184,7 +184,7 @@ std::string legend(bool with_far) {
     const Track track{{{x, 16}, {x + 10, 11}, {x + 24, 13}}, 0.0, entry.through_vmp};
     draw_track(track, entry.is_far, &svg);
     svg.text({x + 34, 17}, entry.text, Anchor::kStart);
-    x += 60.0 + 7.2 * static_cast<double>(entry.text.size());
+    x += 52.0 + 6.6 * static_cast<double>(entry.text.size());
   }
   return svg.finish("Legend of the tracks");
 }

@@ -41,17 +41,24 @@ std::string top_view(const Runs& runs, const Truth* truth, const std::string& un
   return plot.svg();
 }
 
+std::vector<TimedVector> positions_of(const Trajectory& trajectory) {
+  std::vector<TimedVector> positions;
+  for (const TimedPose& p : trajectory.poses) positions.push_back({p.time_s, p.pose.t});
+  return positions;
+}
+
 std::string height_view(const Runs& runs, const Truth* truth, const std::string& unit) {
-  Plot plot({"Height", {"way, " + unit}, {"z, " + unit}, false, 520, 300});
+  double end_s = runs[0].start_s;
+  for (const RunRecord& run : runs) end_s = std::max(end_s, run.end_s());
+  Plot plot({"Height", {"time since the first frame, s"}, {"z, " + unit}, false, 520, 300});
   const auto add = [&](const std::string& name, const Trajectory& in_world, const Style& style) {
-    const std::vector<double> way = way_along(in_world);
-    std::vector<Eigen::Vector2d> points;
-    for (std::size_t k = 0; k < way.size(); ++k) points.emplace_back(way[k], in_world.poses[k].pose.t.z());
-    plot.line(name, points, style);
+    plot.line(name, component_over_time(positions_of(in_world), 2, runs[0].start_s, end_s), style);
   };
   if (truth != nullptr) add("truth", truth_for(runs[0], *truth), truth_style());
-  for (std::size_t i = 0; i < runs.size(); ++i)
+  for (std::size_t i = 0; i < runs.size(); ++i) {
     add(runs[i].name + ", final", final_in_world(runs[i]), run_style(i));
+    add(runs[i].name + ", live", live_in_world(runs[i]), thin_run_style(i));
+  }
   return plot.svg();
 }
 

@@ -46,6 +46,17 @@ TEST(Motion, RollPitchAndYawAreThoseThatTurnedIt) {
         roll_pitch_yaw_deg(turned(roll, pitch, yaw)).isApprox(Eigen::Vector3d(roll, pitch, yaw), 1e-6));
 }
 
+TEST(Motion, AnglesAboutHalfATurnStayTogether) {
+  const std::vector<TimedVector> angles = {
+      {0.0, {179.0, 1.0, 0.0}}, {0.1, {-179.0, -1.0, 90.0}}, {0.2, {-178.0, 0.0, 0.0}}};
+  const Eigen::Vector3d centre = mean_angles_deg(angles);
+  EXPECT_NEAR(std::abs(centre.x()), 179.33, 0.01);
+  EXPECT_NEAR(centre.y(), 0.0, 1e-9);
+  const std::vector<TimedVector> together = angles_around(centre, angles);
+  EXPECT_NEAR(std::abs(together[0].value.x() - together[1].value.x()), 2.0, 1e-9);
+  EXPECT_NEAR(together[1].value.z(), 90.0, 1e-9);
+}
+
 TEST(Motion, AttitudeErrorIsAboutTheBodysAxes) {
   Trajectory truth, estimate;
   for (int i = 0; i < 10; ++i) {

@@ -250,7 +250,7 @@ TEST_F(Tracks, RunsAreShownAtOneInstant) {
   EXPECT_EQ(count_of(html, "<title>Feature tracks<"), 6U);
   std::vector<std::string> times[2];
   for (const auto& [name, index] : {std::pair("one", 0), {"two", 1}}) {
-    const std::string lead = ">" + std::string(name) + ", ";
+    const std::string lead = std::string(1, '>').append(name).append(", ");
     for (std::size_t at = html.find(lead); at != std::string::npos; at = html.find(lead, at + 1))
       times[index].push_back(html.substr(at + lead.size(), html.find(" s:", at) - at - lead.size()));
   }
