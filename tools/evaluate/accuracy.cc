@@ -212,6 +212,7 @@ std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, do
 std::vector<LengthError> segment_errors(const std::vector<PosePair>& pairs, double scale,
                                         const std::vector<double>& lengths_m) {
   std::vector<LengthError> errors;
+  errors.reserve(lengths_m.size());
   for (const double length_m : lengths_m) errors.push_back({length_m, {}});
   for_each_segment(pairs, scale, lengths_m, [&](std::size_t i, const SE3& error) {
     add_segment(error, lengths_m[i], &errors[i].error);

@@ -78,6 +78,7 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Quaterniond& q) {
 
 std::vector<TimedVector> attitudes_deg(const Trajectory& trajectory) {
   std::vector<TimedVector> attitudes;
+  attitudes.reserve(trajectory.poses.size());
   for (const TimedPose& p : trajectory.poses) attitudes.push_back({p.time_s, roll_pitch_yaw_deg(p.pose.q)});
   return attitudes;
 }

@@ -86,6 +86,7 @@ std::vector<Quantity> velocities(const Runs& runs, const Truth* truth, bool as_s
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
     std::vector<TimedVector> published;
+    published.reserve(runs[i].velocities.size());
     const double scale = runs[i].world_from_live_map().scale;
     for (const PublishedVelocity& v : runs[i].velocities) published.push_back({v.time_s, scale * v.linear});
     published = wanted(std::move(published));

@@ -85,7 +85,7 @@ std::vector<Eigen::Vector2d> thinned(const std::vector<Eigen::Vector2d>& points,
   return kept;
 }
 
-void Plot::line(const std::string& name, std::vector<Eigen::Vector2d> points, const Style& style) {
+void Plot::line(const std::string& name, const std::vector<Eigen::Vector2d>& points, const Style& style) {
   layers_.push_back({Kind::kLine, name, thinned(points, kMostPoints), style, 0.0, {}});
 }
 

@@ -42,7 +42,7 @@ class Plot {
   explicit Plot(PlotFrame frame) : frame_(std::move(frame)) {}
 
   // A point that is not finite breaks the line.
-  void line(const std::string& name, std::vector<Eigen::Vector2d> points, const Style& style);
+  void line(const std::string& name, const std::vector<Eigen::Vector2d>& points, const Style& style);
   void dots(const std::string& name, std::vector<Eigen::Vector2d> points, const std::string& colour,
             double side_px = 2.0);
   // Outline of a histogram: counts.size() + 1 edges.

@@ -48,7 +48,9 @@ std::vector<Eigen::Vector2d> all_else_ms(const RunRecord& run) {
 std::vector<double> times_ms(const RunRecord& run, int stage) {
   std::vector<double> values;
   if (stage == kAllElse) {
-    for (const Eigen::Vector2d& p : all_else_ms(run)) values.push_back(p.y());
+    const std::vector<Eigen::Vector2d> points = all_else_ms(run);
+    values.reserve(points.size());
+    for (const Eigen::Vector2d& p : points) values.push_back(p.y());
     return values;
   }
   for (const timing_t& t : run.timings) {

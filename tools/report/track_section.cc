@@ -72,6 +72,7 @@ std::vector<Instant> instants_of(const std::vector<SightingsByTime>& runs) {
     std::int64_t wanted = time_at_share(runs.front(), share);
     if (!common.empty()) wanted = nearest_time(common, wanted);
     Instant instant;
+    instant.reserve(runs.size());
     for (const SightingsByTime& run : runs) instant.push_back(nearest_time(run, wanted));
     if (std::find(instants.begin(), instants.end(), instant) == instants.end()) instants.push_back(instant);
   }

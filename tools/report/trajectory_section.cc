@@ -43,6 +43,7 @@ std::string top_view(const Runs& runs, const Truth* truth, const std::string& un
 
 std::vector<TimedVector> positions_of(const Trajectory& trajectory) {
   std::vector<TimedVector> positions;
+  positions.reserve(trajectory.poses.size());
   for (const TimedPose& p : trajectory.poses) positions.push_back({p.time_s, p.pose.t});
   return positions;
 }
@@ -72,6 +73,7 @@ std::vector<std::string> error_paths(const Runs& runs, const Truth& truth) {
     pairs_of_runs.push_back(is_aligned ? pair_nearest(truth_for(run, truth), final_in_world(run))
                                        : std::vector<PosePair>{});
     std::vector<double> errors_m;
+    errors_m.reserve(pairs_of_runs.back().size());
     for (const PosePair& pair : pairs_of_runs.back()) errors_m.push_back(error_m(pair));
     if (!errors_m.empty()) high_m = std::max(high_m, percentile(std::move(errors_m), 98.0));
   }
@@ -85,6 +87,7 @@ std::vector<std::string> error_paths(const Runs& runs, const Truth& truth) {
       colours.values.push_back(error_m(pair));
     }
     std::vector<Eigen::Vector2d> points;
+    points.reserve(path.poses.size());
     for (const TimedPose& p : path.poses) points.emplace_back(p.pose.t.head<2>());
     plot.coloured_line(std::move(points), std::move(colours));
     label_ends(path, true, &plot);
