@@ -33,7 +33,7 @@ TEST(Axis, ShortLogarithmicAxisHasTicksToReadBy) {
   EXPECT_EQ(tick_text(1.2, 0.2, true), "1.2");
   EXPECT_EQ(tick_text(500, 300, true), "500");
   EXPECT_EQ(tick_text(0.0002, 0.0003, true), "0.0002");
-  EXPECT_EQ(tick_text(2.5, 2.5, false), "2.5");
+  EXPECT_EQ(tick_text(0.25, 0.05, false), "0.25");
   EXPECT_EQ(tick_text(20, 10, false), "20");
 }
 
