@@ -77,6 +77,7 @@ TEST(Plot, WithoutLinesOrDotsThereAreNoAxes) {
 
 TEST(Plot, ThinningKeepsPeaksAndBreaks) {
   std::vector<Eigen::Vector2d> points;
+  points.reserve(30'000);
   for (int i = 0; i < 30'000; ++i) points.emplace_back(i, i == 17'003 ? 99.0 : std::sin(i));
   points[8'001] = {NAN, NAN};
   const std::vector<Eigen::Vector2d> kept = thinned(points, 1500);
@@ -150,6 +151,7 @@ TEST(Histogram, BinsOfKeyframesHoldAsManyFramesEach) {
     EXPECT_GE(bins.back(), high_s);
     std::vector<double> lives_s;
     const auto frames = static_cast<int>(std::lround((bins.back() + 0.5 * frame_s) / frame_s));
+    lives_s.reserve(static_cast<std::size_t>(frames));
     for (int i = 0; i < frames; ++i) lives_s.push_back(frame_s * i);
     const std::vector<double> shares = shares_percent(lives_s, bins);
     for (const double share : shares) EXPECT_NEAR(share, shares.front(), 1e-6) << high_s << " " << frame_s;

@@ -212,6 +212,7 @@ landmarks_t landmarks_seen(const std::vector<std::int64_t>& utimes, bool through
 
 std::vector<std::int64_t> multiples(std::int64_t step, std::int64_t first, int n) {
   std::vector<std::int64_t> utimes;
+  utimes.reserve(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) utimes.push_back(first + step * i);
   return utimes;
 }
