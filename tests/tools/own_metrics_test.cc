@@ -88,6 +88,7 @@ TEST_F(RunWithoutTruth, HasNoErrorsInJsonAndTable) {
   for (const char* absent : {"align", "truth_point", "final.n", "final.share", "final.ate_rmse_m",
                              "final.scale", "live.n", "triangulation_depth_m", "landmarks"})
     EXPECT_EQ(json.find(absent)->dump(), "null") << absent;
+  ASSERT_NE(json.find("compared_with_truth"), nullptr);
   EXPECT_EQ(json.find("compared_with_truth")->dump(), "false");
   EXPECT_EQ(json.find("own.final.path")->number(), 100.0);
   EXPECT_EQ(json.find("own.points")->number(), 1234.0);

@@ -56,6 +56,7 @@ TEST_F(Sections, PathsAreDrawnFinalLiveAndByTheirError) {
                            "<title>one, final: position error<", "<title>two, final: position error<",
                            ">error after alignment, m<"})
     EXPECT_TRUE(has(html, part)) << part;
+  EXPECT_EQ(count_of(html, ">one, live<"), 2U) << "from above and in height";
   const std::string alone = trajectory_section(runs(nullptr), nullptr);
   EXPECT_TRUE(has(alone, ">one, live<"));
   EXPECT_TRUE(has(alone, ">x, map units<"));
