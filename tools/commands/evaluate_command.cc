@@ -39,10 +39,11 @@ std::size_t frame_number(std::string_view text, const std::string& all) {
 }
 
 std::vector<FrameRange> parse_segments(const std::string& text) {
+  const std::string_view all = text;
   std::vector<FrameRange> ranges;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string_view item = std::string_view(text).substr(begin, end - begin);
+    const std::string_view item = all.substr(begin, end - begin);
     const std::size_t colon = item.find(':');
     if (colon == std::string_view::npos) {
       throw InputError("--segments '" + text + "': expected FROM:TO[,FROM:TO...], found '" +
@@ -76,6 +77,7 @@ void make_names_unique(const std::vector<std::string>& files, std::vector<RunMet
 // True where every condition holds. Each broken one is said on standard error.
 bool check_expectations(const std::vector<std::string>& conditions, const std::vector<RunMetrics>& runs) {
   std::vector<std::pair<std::string, Json>> named;
+  named.reserve(runs.size());
   for (const RunMetrics& run : runs) named.emplace_back(run.name, to_json(run));
   bool all_hold = true;
   for (const std::string& condition : conditions) {
