@@ -323,7 +323,8 @@ void Plot::draw_legend(Svg* svg) const {
   const double room_px = width_px() / columns;
   int n = 0;
   for (const Layer* layer : named_layers()) {
-    const Eigen::Vector2d at(kLeft_px + (n % columns) * room_px, top + (n / columns) * kLegendRow_px);
+    const int row = n / columns, column = n % columns;
+    const Eigen::Vector2d at(kLeft_px + column * room_px, top + row * kLegendRow_px);
     if (layer->kind == Kind::kDots)
       svg->rectangle(at + Eigen::Vector2d(12, -4), {8, 8}, "fill=\"" + layer->style.colour + "\"");
     else
@@ -332,7 +333,8 @@ void Plot::draw_legend(Svg* svg) const {
               Anchor::kStart);
     ++n;
   }
-  top += kLegendRow_px * ((n + columns - 1) / columns);
+  const int rows = (n + columns - 1) / columns;
+  top += kLegendRow_px * rows;
   if (const Layer* layer = coloured_layer()) draw_colour_bar(*layer, top - 4.0, svg);
 }
 
