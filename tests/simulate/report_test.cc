@@ -149,15 +149,19 @@ TEST_F(ReportOfARun, ShowsEverySectionAndNeedsNothingElse) {
   const std::string html = without_images(whole);
   expect_well_formed(html);
   for (const char* title :
-       {"Overview", "Trajectory", "Landmarks", "Virtual map points", "Map", "Feature tracks", "Timing",
-        "Work", "States, faults, queues, memory", "Configuration and build"})
+       {"Overview", "Trajectory", "Errors", "Attitude and velocity", "Landmarks", "Virtual map points", "Map",
+        "Feature tracks", "Timing", "Work", "States, faults, queues, memory", "Configuration and build"})
     EXPECT_NE(html.find(std::string("<h2>") + title), std::string::npos) << title;
-  // No network, no script, no number that is none.
+  // No network, one script of its own, no number that is none.
+  const std::size_t script = html.find("<script>");
+  ASSERT_NE(script, std::string::npos);
+  EXPECT_EQ(html.find("<script", script + 1), std::string::npos);
   std::string no_namespace = html;
   const std::string name_space = "xmlns=\"http://www.w3.org/2000/svg\"";  // a name, never fetched
   for (std::size_t at = 0; (at = no_namespace.find(name_space, at)) != std::string::npos;)
     no_namespace.erase(at, name_space.size());
-  for (const char* part : {"http", "<script", "src=", "<link", "nan", "inf\""})
+  for (const char* part :
+       {"http", "fetch(", "XMLHttp", "import(", "<script ", "src=", "<link", "nan", "inf\""})
     EXPECT_EQ(no_namespace.find(part), std::string::npos) << part;
 }
 

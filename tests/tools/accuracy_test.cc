@@ -138,6 +138,41 @@ TEST(SegmentError, GivesDriftInPercentAndDegreesAMetre) {
   EXPECT_FALSE(segment_error(pair_nearest(truth, estimate), 1.0).has_value());
 }
 
+// Straight ahead, 1 m a frame, with a zigzag of 0.5 m: its share falls with the length.
+TEST(SegmentError, IsGivenForEachLengthThatFits) {
+  Trajectory truth, estimate;
+  for (int i = 0; i < 300; ++i) {
+    truth.poses.push_back(at(0.1 * i, {1.0 * i, 0, 0}));
+    estimate.poses.push_back(at(0.1 * i, {1.0 * i, i % 14 < 7 ? 0.5 : 0.0, 0}));
+  }
+  const std::vector<PosePair> pairs = pair_nearest(truth, estimate);
+  const std::vector<LengthError> errors = segment_errors(pairs, 1.0, {9.0, 100.0, 200.0, 400.0});
+  ASSERT_EQ(errors.size(), 3U) << "400 m fit nowhere";
+  EXPECT_EQ(errors[0].length_m, 9.0);
+  EXPECT_EQ(errors[2].length_m, 200.0);
+  EXPECT_EQ(errors[2].error.segments, 10U);
+  EXPECT_GT(errors[0].error.translation_percent, 2.0);
+  EXPECT_LT(errors[2].error.translation_percent, 1.0);
+  // Over 100 to 800 m the one figure is the mean of all segments.
+  const std::vector<LengthError> kitti = segment_errors(pairs, 1.0, {100.0, 200.0});
+  const auto whole = segment_error(pairs, 1.0);
+  double sum = 0.0;
+  for (const LengthError& e : kitti)
+    sum += e.error.translation_percent * static_cast<double>(e.error.segments);
+  EXPECT_NEAR(whole->translation_percent, sum / static_cast<double>(whole->segments), 1e-9);
+}
+
+TEST(PairInterpolated, TruthIsAtTheEstimatesOwnTime) {
+  Trajectory truth, estimate;
+  for (int i = 0; i < 100; ++i) truth.poses.push_back(at(0.01 * i, {1.0 * i, 0, 0}));
+  estimate.poses.push_back(at(0.123, {0, 0, 0}));
+  estimate.poses.push_back(at(5.0, {0, 0, 0}));
+  const std::vector<PosePair> pairs = pair_interpolated(truth, estimate);
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_NEAR(pairs[0].T_world_body.t.x(), 12.3, 1e-9);
+  EXPECT_TRUE(pair_interpolated({}, estimate).empty());
+}
+
 TEST(OneSecondError, FindsAConstantDriftAndTheWorstPose) {
   Trajectory truth, estimate;
   const double rate_rad = 50.0 * kRadiansPerDegree;  // a second, about z

@@ -2,9 +2,16 @@
 #include "tools/top/board.h"
 
 #include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <sstream>
+
+#include "tests/tools/tool_support.h"
 
 namespace farpoint::tools {
 namespace {
@@ -109,6 +116,140 @@ TEST(Top, WithoutAPoseNoNumbersAreShown) {
   EXPECT_TRUE(has(text, "NO_CAMERA"));
   EXPECT_TRUE(has(text, "no valid pose"));
   EXPECT_FALSE(has(text, "99.00"));
+}
+
+TEST(Top, AStateThatIsNotTrackingHasItsReason) {
+  const std::pair<int, const char*> reasons[] = {
+      {status_t::STATE_STARTING, "no image yet"},      {status_t::STATE_INITIALISING, "map not started"},
+      {status_t::STATE_SETTLING, "scale is settling"}, {status_t::STATE_DEGRADED, "few landmarks"},
+      {status_t::STATE_LOST, "tracking lost"},         {status_t::STATE_RELOCALISING, "place not recognised"},
+      {status_t::STATE_NO_CAMERA, "no camera"}};
+  for (const auto& [state, reason] : reasons) {
+    Board board;
+    board.take(status_of(state), 100.0);
+    EXPECT_TRUE(has(board.render(100.1, false), "reason    ")) << reason;
+    EXPECT_TRUE(has(board.render(100.1, false), reason)) << reason;
+  }
+  Board board;
+  odometry_t o{};
+  o.valid = 1;
+  board.take(status_of(status_t::STATE_TRACKING), 100.0);
+  EXPECT_TRUE(has(board.render(100.1, false), "reason    no odometry received"));
+  board.take(o, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "reason"));
+  EXPECT_TRUE(has(board.render(100.6, false), "reason    no pose in time: the last odometry came 0.6 s ago"));
+  status_t s = status_of(status_t::STATE_TRACKING);
+  s.message = "the calibration contradicts the images";
+  board.take(s, 100.7);
+  EXPECT_TRUE(has(board.render(100.7, false), "reason    the calibration contradicts"));
+}
+
+TEST(Top, TimeSinceTheLastValidPoseIsShown) {
+  Board board;
+  board.take(status_of(status_t::STATE_LOST), 100.0);
+  EXPECT_TRUE(has(board.render(103.2, false), "no valid pose since top began to listen, 3 s ago"));
+  odometry_t o{};
+  o.valid = 1;
+  board.take(o, 104.0);
+  o.valid = 0;
+  board.take(o, 109.0);
+  EXPECT_TRUE(has(board.render(110.5, false), "last valid pose 6.5 s ago"));
+}
+
+TEST(Top, SigmasAreShownWhereTheyAreKnown) {
+  Board board;
+  board.take(status_of(status_t::STATE_TRACKING), 100.0);
+  odometry_t o{};
+  o.valid = 1;
+  o.scale_state = status_t::SCALE_ASSUMED;
+  for (int i = 0; i < 6; ++i) o.pose_covariance[i][i] = o.twist_covariance[i][i] = NAN;
+  board.take(o, 100.0);
+  EXPECT_TRUE(has(board.render(100.1, false), "sigma     position -   attitude -   velocity -\n"));
+  for (int i = 0; i < 3; ++i) o.pose_covariance[i][i] = 0.03;  // 0.3 m in all
+  for (int i = 3; i < 6; ++i) o.pose_covariance[i][i] = 1.0 / 3.0 / 57.29577951308232 / 57.29577951308232;
+  for (int i = 0; i < 3; ++i) o.twist_covariance[i][i] = 0.0012;
+  board.take(o, 100.2);
+  EXPECT_TRUE(
+      has(board.render(100.3, false), "sigma     position 0.3 m   attitude 1 deg   velocity 0.06 m/s\n"))
+      << board.render(100.3, false);
+}
+
+TEST(Top, CpuAndImageRateAreOfTheLastSeconds) {
+  Board board;
+  for (int i = 0; i <= 40; ++i) {
+    const double now_s = 100.0 + 0.1 * i;
+    timing_t t{};
+    t.process_cpu_s = 7.0 + 0.03 * i;
+    board.take(t, now_s);
+    status_t s = status_of(status_t::STATE_TRACKING);
+    s.frames_received = 1000 + 3 * i;
+    board.take(s, now_s);
+  }
+  const std::string text = board.render(104.0, false);
+  EXPECT_TRUE(has(text, "CPU       30 % of one core")) << text;
+  EXPECT_TRUE(has(text, "images 30.0 Hz")) << text;
+  // A daemon that starts again counts from zero.
+  status_t s = status_of(status_t::STATE_TRACKING);
+  s.frames_received = 3;
+  board.take(s, 104.1);
+  timing_t t{};
+  t.process_cpu_s = 0.1;
+  board.take(t, 104.1);
+  const std::string again = board.render(104.2, false);
+  EXPECT_TRUE(has(again, "images 0.0 Hz") && has(again, "CPU       -\n")) << again;
+}
+
+TEST(Top, PointsAreLandmarksWithADepth) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  s.keyframes = 12;
+  s.landmarks = 1500;
+  s.vmps = 266;
+  board.take(s, 100.0);
+  EXPECT_TRUE(has(board.render(100.1, false), "map       12 keyframes   1234 points   266 virtual points"));
+}
+
+TEST(Top, ABusThatIsNotInUseIsOff) {
+  status_t s{};
+  EXPECT_STREQ(bus_text(s), "off");
+  Board board;
+  board.take(s, 100.0);
+  EXPECT_TRUE(has(board.render(100.1, false), "CAN       off\n"));
+  s.can_send_errors = 1;  // in use, and no frame has gone out yet
+  EXPECT_STREQ(bus_text(s), "unknown");
+  s.can_state = status_t::CAN_ACTIVE;
+  EXPECT_STREQ(bus_text(s), "active");
+}
+
+// The program on a terminal of its own.
+TEST(Top, LeavesWhenQIsPressed) {
+  int terminal = -1;
+  const std::string path = program();
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    // Ends by itself after half a minute if the key does nothing.
+    execl(path.c_str(), path.c_str(), "top", "--lcm-url", "memq://", "--seconds", "30", nullptr);
+    _exit(127);
+  }
+  std::string seen;
+  std::array<char, 4096> part{};
+  bool pressed = false;
+  // The end of the child ends the terminal.
+  for (ssize_t got = 0; (got = read(terminal, part.data(), part.size())) > 0;) {
+    seen.append(part.data(), static_cast<std::size_t>(got));
+    if (!pressed && has(seen, "q: leave")) {
+      pressed = true;
+      EXPECT_EQ(write(terminal, "xq", 2), 2);
+    }
+  }
+  close(terminal);
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << seen;
+  EXPECT_TRUE(pressed) << seen;
+  EXPECT_LT(std::count(seen.begin(), seen.end(), 'H'), 60) << "29 s of pictures more";
+  EXPECT_FALSE(has(seen, "xq")) << "keys are not echoed";
 }
 
 TEST(Top, EveryStateHasItsName) {

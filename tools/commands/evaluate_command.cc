@@ -39,10 +39,11 @@ std::size_t frame_number(std::string_view text, const std::string& all) {
 }
 
 std::vector<FrameRange> parse_segments(const std::string& text) {
+  const std::string_view all = text;
   std::vector<FrameRange> ranges;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string_view item = std::string_view(text).substr(begin, end - begin);
+    const std::string_view item = all.substr(begin, end - begin);
     const std::size_t colon = item.find(':');
     if (colon == std::string_view::npos) {
       throw InputError("--segments '" + text + "': expected FROM:TO[,FROM:TO...], found '" +
@@ -76,6 +77,7 @@ void make_names_unique(const std::vector<std::string>& files, std::vector<RunMet
 // True where every condition holds. Each broken one is said on standard error.
 bool check_expectations(const std::vector<std::string>& conditions, const std::vector<RunMetrics>& runs) {
   std::vector<std::pair<std::string, Json>> named;
+  named.reserve(runs.size());
   for (const RunMetrics& run : runs) named.emplace_back(run.name, to_json(run));
   bool all_hold = true;
   for (const std::string& condition : conditions) {
@@ -99,9 +101,29 @@ void print_text(const std::vector<RunMetrics>& runs) {
   std::printf("\n%s", table_text(runs).c_str());
 }
 
+void require_truth_for_its_options(const EvaluateOptions& options) {
+  const bool asks_for_truth =
+      !options.align.empty() || options.planar || options.truth_point != "auto" || !options.segments.empty();
+  if (asks_for_truth && options.truth.empty()) {
+    throw InputError(
+        "--align, --planar, --truth-point and --segments compare with truth, expected --truth FILE beside "
+        "them");
+  }
+}
+
+Truth truth_of(const EvaluateOptions& options) {
+  if (options.truth.empty()) return {};
+  Truth truth = read_reference(options.truth, !options.without_landmarks);
+  if (!truth.is_known())
+    std::fprintf(stderr, "farpoint: warning: %s: no GROUND_TRUTH messages, evaluated without truth\n",
+                 options.truth.c_str());
+  return truth;
+}
+
 int run_evaluate(const EvaluateOptions& options) {
+  require_truth_for_its_options(options);
   const EvaluationOptions evaluation = to_evaluation_options(options);
-  const Truth truth = read_truth(options.truth, !options.without_landmarks);
+  const Truth truth = truth_of(options);
   std::vector<RunMetrics> runs;
   for (const std::string& file : options.runs)
     runs.push_back(evaluate_run(read_run(file), truth, evaluation));
@@ -114,10 +136,13 @@ int run_evaluate(const EvaluateOptions& options) {
 
 void add_evaluate_command(CLI::App* app, Action* action) {
   const auto options = std::make_shared<EvaluateOptions>();
-  CLI::App* command = app->add_subcommand("evaluate", "Say how good runs are against truth, side by side");
+  CLI::App* command =
+      app->add_subcommand("evaluate", "Say how good runs are, against truth or by themselves");
   command->add_option("RUN", options->runs, "Output logs of farpointd, or TUM trajectory files")->required();
-  command->add_option("--truth", options->truth, "The recording (LCM log with GROUND_TRUTH), or a TUM file")
-      ->required();
+  command->add_option(
+      "--truth", options->truth,
+      "The recording (LCM log with GROUND_TRUTH), or a TUM file. Without it: validity, losses,\n"
+      "path length, counts and times, no errors");
   command
       ->add_option(
           "--align", options->align,
@@ -163,10 +188,17 @@ void add_evaluate_command(CLI::App* app, Action* action) {
       "  RPE    over 100, 200 .. 800 m of path, and over one second (truth interpolated)\n"
       "  depth  when a point was made; distance: over all observations of the final map; metres by the "
       "alignment\n"
+      "  points landmarks with a depth, of the map with most frames; 'all maps' counts every map's, and "
+      "virtual\n"
+      "         map points (landmarks without a depth) apart. depth counts those with a sigma under 30 %\n"
       "  VMP %  points made through a virtual map point, of all points made\n"
+      "  blind  longest time without a new valid pose after the first one; path: the estimate's own length, "
+      "in\n"
+      "         map units where the scale is unknown\n"
       "  landmarks  against a simulated recording's world: distance from the camera that first saw each, in\n"
       "         metres by the scale of the six seconds around; error/claim is 1 where sigmas are honest\n"
       "Examples:\n"
+      "  farpoint evaluate run.lcm\n"
       "  farpoint evaluate run.lcm --truth kitti03.lcm\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --segments 0:70,110:400\n"
       "  farpoint evaluate baseline.lcm vmp.lcm --truth kitti03.lcm --expect 'vmp.ate <= 1.03 baseline.ate' "

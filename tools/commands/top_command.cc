@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <lcm/lcm.h>
 #include <poll.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
@@ -44,6 +47,38 @@ void take(const lcm_recv_buf_t* buffer, const char* /*channel*/, void* user) {
   }
 }
 
+// Keys of a terminal, one by one and not echoed; the terminal is restored in the end. Without a terminal
+// there are no keys.
+class Keyboard {
+ public:
+  explicit Keyboard(bool in_use) {
+    if (!in_use || isatty(STDIN_FILENO) != 1 || tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    termios keys = before_;
+    keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // signals of Ctrl-C and Ctrl-Z stay
+    is_open_ = tcsetattr(STDIN_FILENO, TCSANOW, &keys) == 0;
+  }
+  ~Keyboard() {
+    if (is_open_) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+  Keyboard(const Keyboard&) = delete;
+  Keyboard& operator=(const Keyboard&) = delete;
+
+  // For poll(), which ignores the -1 of no keys.
+  [[nodiscard]] int descriptor() const { return is_open_ && !at_end_ ? STDIN_FILENO : -1; }
+  // True if one of the keys that were pressed is 'q'.
+  [[nodiscard]] bool read_quit() {
+    std::array<char, 64> keys{};
+    const ssize_t got = read(STDIN_FILENO, keys.data(), keys.size());
+    at_end_ = got <= 0;
+    return std::any_of(keys.begin(), keys.begin() + std::max<ssize_t>(got, 0),
+                       [](char key) { return key == 'q' || key == 'Q'; });
+  }
+
+ private:
+  termios before_{};
+  bool is_open_ = false, at_end_ = false;
+};
+
 // The network until it is destroyed.
 class Listener {
  public:
@@ -60,12 +95,16 @@ class Listener {
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
-  // Handles what comes within so long.
-  void listen(int milliseconds) {
+  // Handles what comes within the time; ends early when 'q' is pressed.
+  void listen(int milliseconds, Keyboard* keyboard) {
     for (double until_s = steady_s() + 1e-3 * milliseconds, now_s = steady_s();
          now_s < until_s && interrupted == 0; now_s = steady_s()) {
-      pollfd descriptor{lcm_get_fileno(lcm_), POLLIN, 0};
-      if (poll(&descriptor, 1, static_cast<int>(1e3 * (until_s - now_s)) + 1) > 0) lcm_handle(lcm_);
+      std::array descriptors = {pollfd{lcm_get_fileno(lcm_), POLLIN, 0},
+                                pollfd{keyboard->descriptor(), POLLIN, 0}};
+      if (poll(descriptors.data(), descriptors.size(), static_cast<int>(1e3 * (until_s - now_s)) + 1) <= 0)
+        continue;
+      if ((descriptors[0].revents & POLLIN) != 0) lcm_handle(lcm_);
+      if (descriptors[1].revents != 0 && keyboard->read_quit()) interrupted = 1;
     }
   }
 
@@ -76,16 +115,17 @@ class Listener {
 int run_top(const TopOptions& options) {
   constexpr int kRefresh_ms = 200;
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.plain;
+  Keyboard keyboard(terminal);
   Board board;
   Listener listener(options.url, &board);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
   const double began_s = steady_s();
   do {
-    listener.listen(kRefresh_ms);
+    listener.listen(kRefresh_ms, &keyboard);
     if (!terminal) continue;
     // From the upper left corner over the picture before; what is left of that is wiped.
-    std::printf("\x1b[H\x1b[2J%s", board.render(steady_s(), true).c_str());
+    std::printf("\x1b[H\x1b[2J%s\nq: leave\n", board.render(steady_s(), true).c_str());
     std::fflush(stdout);
   } while (interrupted == 0 && (options.seconds <= 0.0 || steady_s() - began_s < options.seconds));
   if (!terminal) std::fputs(board.render(steady_s(), false).c_str(), stdout);
@@ -108,9 +148,14 @@ void add_top_command(CLI::App* app, Action* action) {
       "Examples:\n"
       "  farpoint top\n"
       "  farpoint top --seconds 2 --plain      (for a script)\n"
-      "All of it comes from LCM: FARPOINT_STATUS, FARPOINT_ODOMETRY and FARPOINT_TIMING. Rates and latencies "
-      "are of\n"
-      "the last five seconds.");
+      "q leaves. All of it comes from LCM: FARPOINT_STATUS, FARPOINT_ODOMETRY and FARPOINT_TIMING. Rates, "
+      "latencies and\n"
+      "CPU are of the last five seconds. reason: why the state is not tracking. sigma: size of the standard "
+      "deviation,\n"
+      "a dash where the daemon gives none. points: landmarks with a depth, of all maps; virtual points have "
+      "none "
+      "yet.\n"
+      "CAN off: no bus is in use.");
   command->callback([options, action] { *action = [options] { return run_top(*options); }; });
 }
 

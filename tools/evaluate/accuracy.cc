@@ -86,15 +86,34 @@ std::optional<SE3> truth_at(const std::vector<TimedPose>& truth, double time_s, 
   return SE3{a.pose.q.slerp(fraction, b.pose.q), a.pose.t + fraction * (b.pose.t - a.pose.t)};
 }
 
-// Estimates with truth at exactly their times.
-std::vector<PosePair> pair_interpolated(const Trajectory& truth, const Trajectory& estimate,
-                                        double tolerance_s) {
-  std::vector<PosePair> pairs;
-  for (const TimedPose& p : estimate.poses) {
-    const std::optional<SE3> T_world_body = truth_at(truth.poses, p.time_s, tolerance_s);
-    if (T_world_body) pairs.push_back({p.time_s, *T_world_body, p.pose, p.map_id});
+// Calls use(number of the length, error) for every segment of each length, begun every tenth pair.
+template <typename Use>
+void for_each_segment(const std::vector<PosePair>& pairs, double scale, const std::vector<double>& lengths_m,
+                      Use&& use) {
+  constexpr std::size_t kStep = 10;
+  const std::vector<double> way_m = true_path_lengths(pairs);
+  for (std::size_t first = 0; first < pairs.size(); first += kStep) {
+    for (std::size_t i = 0; i < lengths_m.size(); ++i) {
+      const auto end = std::upper_bound(way_m.begin() + static_cast<std::ptrdiff_t>(first), way_m.end(),
+                                        way_m[first] + lengths_m[i]);
+      if (end == way_m.end()) break;
+      const auto last = static_cast<std::size_t>(end - way_m.begin());
+      if (pairs[first].map_id != pairs[last].map_id) continue;
+      use(i, motion_error(pairs[first].T_world_body, pairs[last].T_world_body, pairs[first].T_map_body,
+                          pairs[last].T_map_body, scale));
+    }
   }
-  return pairs;
+}
+
+void add_segment(const SE3& error, double length_m, SegmentError* sum) {
+  sum->translation_percent += 100.0 * error.t.norm() / length_m;
+  sum->rotation_deg_per_m += rotation_angle_deg(error) / length_m;
+  ++sum->segments;
+}
+
+void divide_by_segments(SegmentError* sum) {
+  sum->translation_percent /= static_cast<double>(sum->segments);
+  sum->rotation_deg_per_m /= static_cast<double>(sum->segments);
 }
 
 double median_interval_s(const std::vector<PosePair>& pairs) {
@@ -123,6 +142,17 @@ std::vector<PosePair> pair_nearest(const Trajectory& truth, const Trajectory& es
   for (const TimedPose& p : estimate.poses) {
     const TimedPose& t = truth.poses[nearest_index(truth.poses, p.time_s)];
     if (std::abs(t.time_s - p.time_s) <= tolerance_s) pairs.push_back({p.time_s, t.pose, p.pose, p.map_id});
+  }
+  return pairs;
+}
+
+std::vector<PosePair> pair_interpolated(const Trajectory& truth, const Trajectory& estimate,
+                                        double tolerance_s) {
+  std::vector<PosePair> pairs;
+  if (truth.poses.empty()) return pairs;
+  for (const TimedPose& p : estimate.poses) {
+    const std::optional<SE3> T_world_body = truth_at(truth.poses, p.time_s, tolerance_s);
+    if (T_world_body) pairs.push_back({p.time_s, *T_world_body, p.pose, p.map_id});
   }
   return pairs;
 }
@@ -170,32 +200,30 @@ std::optional<AbsoluteError> absolute_error(const std::vector<PosePair>& pairs, 
 }
 
 std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, double scale) {
-  constexpr std::size_t kStep = 10;
-  const std::vector<double> length_m = true_path_lengths(pairs);
+  const std::vector<double> lengths_m = {100, 200, 300, 400, 500, 600, 700, 800};
   SegmentError result;
-  for (std::size_t first = 0; first < pairs.size(); first += kStep) {
-    for (double segment_m = 100.0; segment_m <= 800.0; segment_m += 100.0) {
-      const auto end = std::upper_bound(length_m.begin() + static_cast<std::ptrdiff_t>(first), length_m.end(),
-                                        length_m[first] + segment_m);
-      if (end == length_m.end()) break;
-      const auto last = static_cast<std::size_t>(end - length_m.begin());
-      if (pairs[first].map_id != pairs[last].map_id) continue;
-      const SE3 error = motion_error(pairs[first].T_world_body, pairs[last].T_world_body,
-                                     pairs[first].T_map_body, pairs[last].T_map_body, scale);
-      result.translation_percent += 100.0 * error.t.norm() / segment_m;
-      result.rotation_deg_per_m += rotation_angle_deg(error) / segment_m;
-      ++result.segments;
-    }
-  }
+  for_each_segment(pairs, scale, lengths_m,
+                   [&](std::size_t i, const SE3& error) { add_segment(error, lengths_m[i], &result); });
   if (result.segments == 0) return std::nullopt;
-  result.translation_percent /= static_cast<double>(result.segments);
-  result.rotation_deg_per_m /= static_cast<double>(result.segments);
+  divide_by_segments(&result);
   return result;
+}
+
+std::vector<LengthError> segment_errors(const std::vector<PosePair>& pairs, double scale,
+                                        const std::vector<double>& lengths_m) {
+  std::vector<LengthError> errors;
+  errors.reserve(lengths_m.size());
+  for (const double length_m : lengths_m) errors.push_back({length_m, {}});
+  for_each_segment(pairs, scale, lengths_m, [&](std::size_t i, const SE3& error) {
+    add_segment(error, lengths_m[i], &errors[i].error);
+  });
+  std::erase_if(errors, [](const LengthError& e) { return e.error.segments == 0; });
+  for (LengthError& e : errors) divide_by_segments(&e.error);
+  return errors;
 }
 
 std::optional<OneSecondError> one_second_error(const Trajectory& truth, const Trajectory& estimate,
                                                double scale, double tolerance_s) {
-  if (truth.poses.empty()) return std::nullopt;
   const std::vector<PosePair> pairs = pair_interpolated(truth, estimate, tolerance_s);
   if (pairs.size() < 2) return std::nullopt;
   // Far above any camera's rate. Poses of a damaged log may all lie within one second.

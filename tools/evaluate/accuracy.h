@@ -32,6 +32,10 @@ struct PosePair {
 [[nodiscard]] std::vector<PosePair> pair_nearest(const Trajectory& truth, const Trajectory& estimate,
                                                  double tolerance_s = kPairingTolerance_s);
 
+// The same with truth interpolated at exactly the estimate's times.
+[[nodiscard]] std::vector<PosePair> pair_interpolated(const Trajectory& truth, const Trajectory& estimate,
+                                                      double tolerance_s = kPairingTolerance_s);
+
 // The similarity from map to world coordinates: p_world = scale * R * p_map + t.
 struct MapToWorld {
   slam::Sim3 S_world_map;
@@ -64,6 +68,15 @@ struct SegmentError {
 };
 // `scale`: the alignment's, applied to the estimate's translations. Empty for a path under 100 m.
 [[nodiscard]] std::optional<SegmentError> segment_error(const std::vector<PosePair>& pairs, double scale);
+
+// Mean relative errors over segments of one length of the true path.
+struct LengthError {
+  double length_m = 0.0;
+  SegmentError error;
+};
+// One entry a length that at least one segment has, in the given ascending order.
+[[nodiscard]] std::vector<LengthError> segment_errors(const std::vector<PosePair>& pairs, double scale,
+                                                      const std::vector<double>& lengths_m);
 
 // Relative errors over one second. Truth is interpolated at the estimate's times (a hand-held camera turns by
 // degrees within the pairing tolerance). Pairs of poses of different maps are no pairs.

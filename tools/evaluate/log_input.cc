@@ -112,6 +112,7 @@ class RunCollector {
     if (event.channel == ipc::kTrajectoryChannel) return add_trajectory(event);
     if (event.channel == ipc::kLandmarksChannel) return add_landmarks(event);
     if (event.channel == ipc::kSummaryChannel) return add_summary(event);
+    if (event.channel == ipc::kStatusChannel) return add_status(event);
     return true;
   }
   RunLog finish() {
@@ -121,6 +122,8 @@ class RunCollector {
     }
     sort_by_time(&log_.final_trajectory);
     sort_by_time(&log_.live_trajectory);
+    std::stable_sort(log_.published.begin(), log_.published.end(),
+                     [](const PublishedState& a, const PublishedState& b) { return a.time_s < b.time_s; });
     return std::move(log_);
   }
 
@@ -144,6 +147,7 @@ class RunCollector {
     log_.has_poses = true;
     log_.resets = std::max(log_.resets, message.reset_counter);
     last_scale_state_ = message.scale_state;
+    log_.published.push_back({seconds_of(message.utime), message.state, message.valid != 0});
     if (message.valid == 0) return true;
     const slam::SE3 pose = to_pose(message.position, message.orientation);
     if (!pose.is_finite()) return false;
@@ -175,6 +179,12 @@ class RunCollector {
       if (!pose.is_finite()) return false;
       log_.final_trajectory.poses.push_back({seconds_of(p.utime), pose, p.map_id});
     }
+    return true;
+  }
+  bool add_status(const ipc::LogEvent& event) {
+    status_t message;
+    if (!ipc::decode(event.data, &message)) return false;
+    log_.last_status = std::move(message);
     return true;
   }
   bool add_summary(const ipc::LogEvent& event) {

@@ -30,6 +30,13 @@ struct RecordingLog {
 // Throws InputError if the file cannot be read. Skips damage and reports it in one line on standard error.
 [[nodiscard]] RecordingLog read_recording_log(const std::filesystem::path& file);
 
+// A frame as it was published.
+struct PublishedState {
+  double time_s = 0.0;
+  std::int8_t state = 0;  // status_t.STATE_*
+  bool valid = false;
+};
+
 struct RunLog {
   Trajectory final_trajectory;  // the map with most frames, after the last optimisation
   Trajectory live_trajectory;   // poses published as valid, map frame, every map
@@ -40,6 +47,8 @@ struct RunLog {
   std::int32_t resets = 0;      // highest reset counter published
   std::optional<summary_t> summary;
   std::optional<landmarks_t> landmarks;
+  std::optional<status_t> last_status;
+  std::vector<PublishedState> published;  // ascending in time
   std::vector<TimedFrame> timed_frames;
   std::vector<double> frame_ms;  // thread CPU time of whole frames, mapping included where it runs in step
   std::int64_t deadline_misses = 0;

@@ -97,7 +97,14 @@ DepthMetrics depth_metrics(const map_summary_t& map, double scale) {
   return metrics;
 }
 
-void add_summary(const summary_t& summary, RunMetrics* metrics) {
+// By the alignment; without truth by the run itself, where its scale is not unknown.
+std::optional<double> metres_a_unit(const RunMetrics& metrics, std::int8_t scale_state) {
+  if (metrics.final_metrics.absolute) return metrics.final_metrics.absolute->scale;
+  if (metrics.compared || scale_state == status_t::SCALE_UNKNOWN) return std::nullopt;
+  return 1.0;
+}
+
+void add_summary(const summary_t& summary, std::int8_t scale_state, RunMetrics* metrics) {
   if (summary.frames > 0) {
     metrics->tracked_percent =
         100.0 * static_cast<double>(summary.frames_valid) / static_cast<double>(summary.frames);
@@ -110,8 +117,8 @@ void add_summary(const summary_t& summary, RunMetrics* metrics) {
   }
   if (summary.maps.empty()) return;
   metrics->map_points = summary.maps[0].landmarks;
-  const std::optional<AbsoluteError>& absolute = metrics->final_metrics.absolute;
-  if (absolute) metrics->depth = depth_metrics(summary.maps[0], absolute->scale);
+  if (const std::optional<double> scale = metres_a_unit(*metrics, scale_state))
+    metrics->depth = depth_metrics(summary.maps[0], *scale);
 }
 
 void add_landmarks(const RunLog& log, const Trajectory& truth_at_point, SimulatedWorld* world,
@@ -174,11 +181,11 @@ Json count(std::size_t n) {
   return static_cast<std::int64_t>(n);
 }
 
-Json to_json(const TrajectoryMetrics& metrics) {
+Json to_json(const TrajectoryMetrics& metrics, bool compared) {
   Json json = Json::object();
   const std::optional<AbsoluteError>& a = metrics.absolute;
-  json.set("n", count(metrics.paired));
-  json.set("share", metrics.share);
+  json.set("n", compared ? count(metrics.paired) : Json());
+  json.set("share", compared ? Json(metrics.share) : Json());
   json.set("path_m", a ? Json(a->path_m) : Json());
   json.set("scale", a ? Json(a->scale) : Json());
   json.set("ate_rmse_m", a ? Json(a->rmse_m) : Json());
@@ -233,15 +240,19 @@ Json segments_to_json(const std::vector<SegmentScale>& segments) {
 }  // namespace
 
 Truth read_truth(const std::filesystem::path& file, bool with_world) {
+  Truth truth = read_reference(file, with_world);
+  if (!truth.is_known())
+    throw InputError(file.string() + ": no GROUND_TRUTH messages, expected a recording with truth");
+  return truth;
+}
+
+Truth read_reference(const std::filesystem::path& file, bool with_world) {
   Truth truth;
   if (!is_lcm_log(file)) {
     truth.body = read_tum(file);
     return truth;
   }
   RecordingLog log = read_recording_log(file);
-  if (log.truth.poses.empty()) {
-    throw InputError(file.string() + ": no GROUND_TRUTH messages, expected a recording with truth");
-  }
   truth.T_body_camera0 = log.T_body_camera0();
   truth.names_body = log.calibration && !log.calibration->body_name.empty();
   truth.body = std::move(log.truth);
@@ -265,11 +276,13 @@ Run read_run(const std::filesystem::path& file) {
 RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options) {
   RunMetrics metrics;
   metrics.name = run.name;
+  metrics.compared = truth.is_known();
   metrics.alignment =
       options.alignment.value_or(scale_is_metric(run, options) ? Alignment::kSe3 : Alignment::kSim3);
   metrics.planar = options.planar;
   metrics.scale_state = scale_state_name(run);
   metrics.images = count_frames(run, truth, options);
+  metrics.own = measure_own(run.log ? &*run.log : nullptr, run.final_trajectory, metrics.images);
 
   const bool at_camera0 = compare_at_camera0(run, truth, options);
   metrics.truth_point = at_camera0 ? "camera0" : "body";
@@ -294,7 +307,7 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
     metrics.peak_resident_mb = 1e-6 * static_cast<double>(run.log->peak_resident_bytes);
   metrics.latency = measure_latency(run.log->timed_frames);
   metrics.steadiness = measure_steadiness(run.log->timed_frames);
-  if (run.log->summary) add_summary(*run.log->summary, &metrics);
+  if (run.log->summary) add_summary(*run.log->summary, run.log->scale_state, &metrics);
   if (truth.world) add_landmarks(*run.log, truth_at_point, truth.world.get(), &metrics);
   return metrics;
 }
@@ -302,9 +315,9 @@ RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOpti
 Json to_json(const RunMetrics& metrics) {
   Json json = Json::object();
   json.set("name", metrics.name);
-  json.set("align", to_string(metrics.alignment));
+  json.set("align", metrics.compared ? Json(to_string(metrics.alignment)) : Json());
   json.set("planar", metrics.planar);
-  json.set("truth_point", metrics.truth_point);
+  json.set("truth_point", metrics.compared ? Json(metrics.truth_point) : Json());
   json.set("scale_state", metrics.scale_state);
   json.set("images", metrics.images);
   json.set("tracked_percent", or_null(metrics.tracked_percent));
@@ -324,9 +337,11 @@ Json to_json(const RunMetrics& metrics) {
   json.set("map_points", or_null(metrics.map_points));
   json.set("vmp_percent", or_null(metrics.vmp_percent));
   json.set("landmarks", metrics.landmarks ? to_json(*metrics.landmarks) : Json());
-  json.set("final", to_json(metrics.final_metrics));
-  json.set("live", metrics.live_metrics ? to_json(*metrics.live_metrics) : Json());
+  json.set("final", to_json(metrics.final_metrics, metrics.compared));
+  json.set("live", metrics.live_metrics ? to_json(*metrics.live_metrics, metrics.compared) : Json());
   json.set("segments", segments_to_json(metrics.segments));
+  json.set("compared_with_truth", metrics.compared);
+  json.set("own", to_json(metrics.own));
   return json;
 }
 

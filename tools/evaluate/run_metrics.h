@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Metrics of one run against truth.
+// Metrics of one run, against truth where there is one.
 //
 // Definitions. final: every frame's pose in the map with most frames, after the last optimisation. live: the
 // map-frame poses that were published as valid. share: poses with truth, of all frames of the recording.
+// own: figures that need no truth (own_metrics.h). Points are landmarks with a depth.
 // Triangulation depth: distance from the newest observing keyframe to the point when it was made; observation
 // distance: camera to point, over all observations of the final map; both in metres by the final alignment's
 // scale, depths only of points that survived and whose relative depth sigma was under 30 %.
@@ -19,6 +20,7 @@
 #include "tools/evaluate/accuracy.h"
 #include "tools/evaluate/landmark_metrics.h"
 #include "tools/evaluate/log_input.h"
+#include "tools/evaluate/own_metrics.h"
 #include "tools/evaluate/run_times.h"
 
 namespace farpoint::tools {
@@ -49,10 +51,14 @@ struct Truth {
   bool names_body = false;                 // a lever arm is known: camera 0 is not the body
   std::vector<std::int64_t> frame_utimes;  // of CAMERA_0; empty where the truth is a text file
   std::shared_ptr<SimulatedWorld> world;   // of a simulated recording, where asked for
+
+  [[nodiscard]] bool is_known() const { return !body.poses.empty(); }
 };
 // Reads truth from a recording's log or a TUM file. `with_world`: makes a simulated recording's world again,
 // to judge landmarks. Throws InputError, also for a log without truth.
 [[nodiscard]] Truth read_truth(const std::filesystem::path& file, bool with_world = false);
+// The same, except that a recording without GROUND_TRUTH gives its frames and an unknown truth.
+[[nodiscard]] Truth read_reference(const std::filesystem::path& file, bool with_world = false);
 
 // A run as given on the command line.
 struct Run {
@@ -91,6 +97,7 @@ struct SegmentScale {
 
 struct RunMetrics {
   std::string name;
+  bool compared = true;  // with truth; else what follows has no errors, scale or alignment
   Alignment alignment = Alignment::kSim3;
   bool planar = false;
   const char* truth_point = "body";
@@ -99,6 +106,7 @@ struct RunMetrics {
   TrajectoryMetrics final_metrics;
   std::optional<TrajectoryMetrics> live_metrics;  // nothing: the run is a TUM file
   std::vector<SegmentScale> segments;
+  OwnMetrics own;
 
   // From an output log only.
   std::optional<double> tracked_percent;  // frames published with a valid pose
@@ -111,12 +119,14 @@ struct RunMetrics {
   std::optional<LatencyMetrics> latency;
   std::optional<SteadinessMetrics> steadiness;
   std::optional<DepthMetrics> depth;
-  std::optional<std::int64_t> map_points;
+  std::optional<std::int64_t> map_points;    // of the map with most frames
   std::optional<double> vmp_percent;         // points made through a virtual map point, of all points made
   std::vector<JudgedLandmark> judged;        // of the map with most frames, where the truth has a world
   std::optional<LandmarkMetrics> landmarks;  // their figures
 };
 
+// An unknown truth gives the figures that need none. Throws InputError for options that the truth cannot
+// serve.
 [[nodiscard]] RunMetrics evaluate_run(const Run& run, const Truth& truth, const EvaluationOptions& options);
 
 // Every figure by name; absent ones are null. The absolute error has the key names of the field's scripts.

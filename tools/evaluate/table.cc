@@ -110,25 +110,80 @@ constexpr std::array kColumns = {
     Column{"map", "points"},
     Column{"VMP", "%"},
 };
-using Row = std::array<std::string, kColumns.size()>;
+using Row = std::vector<std::string>;
+
+// Without truth.
+constexpr std::array kOwnColumns = {
+    Column{"", "run"},
+    Column{"", "images"},
+    Column{"tracked", "%"},
+    Column{"first valid", "after s"},
+    Column{"longest", "blind s"},
+    Column{"times", "lost"},
+    Column{"", "resets"},
+    Column{"", "maps"},
+    Column{"CPU time", "of"},
+    Column{"mean", "ms"},
+    Column{"p50", "ms"},
+    Column{"p99", "ms"},
+    Column{"max", "ms"},
+    Column{"latency", "p99 ms"},
+    Column{"deadline", "misses"},
+    Column{"final", "share %"},
+    Column{"final", "path"},
+    Column{"of path", "unit"},
+    Column{"map", "points"},
+    Column{"VMP", "%"},
+};
+
+// Without a time of tracking alone the whole frame's is shown, under its name.
+std::vector<std::string> time_cells(const RunMetrics& m) {
+  const bool tracking_known = !m.tracking_ms.empty();
+  const std::vector<double>& ms = tracking_known ? m.tracking_ms : m.frame_ms;
+  const std::string slowest = ms.empty() ? kAbsent : decimal(*std::max_element(ms.begin(), ms.end()), 1);
+  return {ms.empty() ? kAbsent : (tracking_known ? "tracking" : "frame"), decimal(mean(ms), 1),
+          decimal(percentile(ms, 50.0), 1), decimal(percentile(ms, 99.0), 1), slowest};
+}
+
+template <typename T>
+std::string decimal(const std::optional<T>& value, int digits) {
+  return value ? decimal(*value, digits) : kAbsent;
+}
+
+Row own_row_of(const RunMetrics& m) {
+  Row row = {m.name,
+             std::to_string(m.images),
+             decimal(m.tracked_percent, 1),
+             decimal(m.own.first_valid_s, 2),
+             decimal(m.own.longest_blind_s, 2),
+             integer(m.times_lost),
+             integer(m.resets),
+             integer(m.maps)};
+  for (std::string& cell : time_cells(m)) row.push_back(std::move(cell));
+  row.push_back(m.latency ? decimal(m.latency->p99_ms, 1) : kAbsent);
+  row.push_back(integer(m.deadline_misses));
+  row.push_back(decimal(100.0 * m.own.final_path.share, 1));
+  row.push_back(decimal(m.own.final_path.length, 1));
+  row.emplace_back(m.own.length_unit);
+  row.push_back(integer(m.map_points));
+  row.push_back(decimal(m.vmp_percent, 2));
+  return row;
+}
 
 Row row_of(const RunMetrics& m) {
   const TrajectoryMetrics& final_metrics = m.final_metrics;
   const std::optional<AbsoluteError>& absolute = final_metrics.absolute;
-  // Without a time of tracking alone the whole frame's is shown, and said to be so.
-  const bool tracking_known = !m.tracking_ms.empty();
-  const std::vector<double>& ms = tracking_known ? m.tracking_ms : m.frame_ms;
-  const std::string slowest = ms.empty() ? kAbsent : decimal(*std::max_element(ms.begin(), ms.end()), 1);
+  const std::vector<std::string> times = time_cells(m);
   const std::optional<SegmentError>& rpe = final_metrics.segments;
   return {m.name,
           std::to_string(m.images),
-          m.tracked_percent ? decimal(*m.tracked_percent, 1) : kAbsent,
+          decimal(m.tracked_percent, 1),
           integer(m.resets),
-          ms.empty() ? kAbsent : (tracking_known ? "tracking" : "frame"),
-          decimal(mean(ms), 1),
-          decimal(percentile(ms, 50.0), 1),
-          decimal(percentile(ms, 99.0), 1),
-          slowest,
+          times[0],
+          times[1],
+          times[2],
+          times[3],
+          times[4],
           integer(m.deadline_misses),
           std::string(to_string(m.alignment)) + (m.planar ? " xy" : ""),
           decimal(100.0 * final_metrics.share, 1),
@@ -141,17 +196,49 @@ Row row_of(const RunMetrics& m) {
           spread_text(m.depth, &DepthMetrics::triangulation_m),
           spread_text(m.depth, &DepthMetrics::observation_m),
           integer(m.map_points),
-          m.vmp_percent ? decimal(*m.vmp_percent, 2) : kAbsent};
+          decimal(m.vmp_percent, 2)};
 }
 
-}  // namespace
-
-std::string details_text(const RunMetrics& metrics) {
+std::string truth_text(const RunMetrics& metrics) {
+  if (!metrics.compared) return metrics.name + " no truth: scale of the run: " + metrics.scale_state + "\n";
   std::string text = metrics.name + " truth: compared at the " + metrics.truth_point +
                      ", scale of the run: " + metrics.scale_state + ", aligned by " +
                      to_string(metrics.alignment) + (metrics.planar ? ", x and y only" : "") + "\n";
   text += metrics.name + " final: " + trajectory_text(metrics.final_metrics) + "\n";
   if (metrics.live_metrics) text += metrics.name + " live:  " + trajectory_text(*metrics.live_metrics) + "\n";
+  return text;
+}
+
+template <std::size_t N>
+std::vector<Row> headed_by(const std::array<Column, N>& columns) {
+  std::vector<Row> rows(2);
+  for (const Column& column : columns) {
+    rows[0].emplace_back(column.group);
+    rows[1].emplace_back(column.title);
+  }
+  return rows;
+}
+
+// Names to the left, figures to the right.
+std::string aligned(const std::vector<Row>& rows) {
+  std::vector<std::size_t> width(rows.front().size(), 0);
+  for (const Row& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+  }
+  std::string text;
+  for (const Row& row : rows) {
+    text += row[0] + std::string(width[0] - row[0].size(), ' ');
+    for (std::size_t c = 1; c < row.size(); ++c)
+      text += "  " + std::string(width[c] - row[c].size(), ' ') + row[c];
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string details_text(const RunMetrics& metrics) {
+  std::string text = truth_text(metrics) + own_text(metrics.name, metrics.own);
   if (metrics.depth) {
     text += metrics.name + " depth: points=" + std::to_string(metrics.depth->triangulation_m.count) +
             " over_50_m_percent=" + decimal(metrics.depth->over_50_m_percent, 2) +
@@ -172,24 +259,10 @@ std::string details_text(const RunMetrics& metrics) {
 }
 
 std::string table_text(const std::vector<RunMetrics>& runs) {
-  std::vector<Row> rows(2);
-  for (std::size_t c = 0; c < kColumns.size(); ++c) {
-    rows[0][c] = kColumns[c].group;
-    rows[1][c] = kColumns[c].title;
-  }
-  for (const RunMetrics& run : runs) rows.push_back(row_of(run));
-  std::array<std::size_t, kColumns.size()> width{};
-  for (const Row& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
-  }
-  std::string text;
-  for (const Row& row : rows) {
-    text += row[0] + std::string(width[0] - row[0].size(), ' ');  // names to the left, figures to the right
-    for (std::size_t c = 1; c < row.size(); ++c)
-      text += "  " + std::string(width[c] - row[c].size(), ' ') + row[c];
-    text += "\n";
-  }
-  return text;
+  const bool compared = std::any_of(runs.begin(), runs.end(), [](const RunMetrics& m) { return m.compared; });
+  std::vector<Row> rows = compared ? headed_by(kColumns) : headed_by(kOwnColumns);
+  for (const RunMetrics& run : runs) rows.push_back(compared ? row_of(run) : own_row_of(run));
+  return aligned(rows);
 }
 
 }  // namespace farpoint::tools

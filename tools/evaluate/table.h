@@ -9,10 +9,12 @@
 
 namespace farpoint::tools {
 
-// Lines `NAME final: n=.. share=.. ...` and `NAME live: ...` and so on, one fact a key.
+// Lines `NAME final: n=.. share=.. ...` and `NAME live: ...` and so on, one fact a key; without truth those
+// that need none.
 [[nodiscard]] std::string details_text(const RunMetrics& metrics);
 
-// Two header lines and one row a run, in the given order; the last line is the last run's.
+// Two header lines and one row a run, in the given order; the last line is the last run's. Runs without truth
+// have columns of their own.
 [[nodiscard]] std::string table_text(const std::vector<RunMetrics>& runs);
 
 }  // namespace farpoint::tools

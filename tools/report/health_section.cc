@@ -149,8 +149,7 @@ std::string memory_view(const Runs& runs) {
       return 1e-6 * static_cast<double>(t.resident_bytes);
     });
     if (!resident.empty()) plot.line(runs[i].name + ", resident", resident, run_style(i));
-    Style thin = run_style(i);
-    thin.width_px = 0.9;
+    const Style thin = thin_run_style(i);
     const auto pools = over_time(runs[i], runs[i].statuses, [](const status_t& s) {
       return 1e-6 * static_cast<double>(s.memory_pool_bytes);
     });
@@ -167,9 +166,8 @@ std::string queue_view(const Runs& runs) {
              520,
              300});
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    Style thin = run_style(i);
-    thin.width_px = 0.9;
-    if (runs[i].statuses.empty()) continue;
+    const Style thin = thin_run_style(i);
+    if (runs[i].statuses.empty() || !runs[i].is_threaded()) continue;
     plot.line(runs[i].name + ", to tracking",
               over_time(runs[i], runs[i].statuses, [](const status_t& s) { return s.capture_queue_max; }),
               run_style(i));
@@ -183,19 +181,19 @@ std::string queue_view(const Runs& runs) {
 std::string map_size_view(const Runs& runs) {
   Plot plot({"Size of the map",
              {"time since the first frame, s"},
-             {"landmarks alive", false, 0.0},
+             {"landmarks alive, all maps", false, 0.0},
              false,
              520,
              300});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].statuses.empty()) continue;
     plot.line(runs[i].name + ", points",
-              over_time(runs[i], runs[i].statuses, [](const status_t& s) { return s.landmarks; }),
+              over_time(runs[i], runs[i].statuses, [](const status_t& s) { return map_counts(s).points; }),
               run_style(i));
-    Style thin = run_style(i);
-    thin.width_px = 0.9;
+    const Style thin = thin_run_style(i);
     plot.line(runs[i].name + ", VMPs",
-              over_time(runs[i], runs[i].statuses, [](const status_t& s) { return s.vmps; }), thin);
+              over_time(runs[i], runs[i].statuses, [](const status_t& s) { return map_counts(s).vmps; }),
+              thin);
   }
   return plot.svg();
 }
@@ -225,7 +223,9 @@ std::string health_section(const Runs& runs) {
   return section(
       "States, faults, queues, memory",
       "State of each published frame; below it, one row a kind of fault: a black line where a status message "
-      "said that its counter had risen.",
+      "said that its counter had risen. Points have a depth, virtual map points (VMPs) have none yet; "
+      "landmarks are "
+      "both. Queues are those of a threaded run.",
       row_of({states, match_view(runs), map_size_view(runs), queue_view(runs), memory_view(runs)}));
 }
 

@@ -15,6 +15,16 @@ std::vector<double> edges(double low, double high, int n, bool is_log) {
   return out;
 }
 
+std::vector<double> keyframe_edges(double high_s, double frame_s, int frames_a_keyframe, int most) {
+  const double keyframe_s = frame_s * frames_a_keyframe;
+  const double keyframes_a_bin =
+      std::max(1.0, std::ceil((high_s + 0.5 * frame_s) / (most * keyframe_s) - 1e-9));
+  const double width_s = keyframes_a_bin * keyframe_s;
+  std::vector<double> out = {-0.5 * frame_s};
+  for (int i = 1; i <= most && out.back() < high_s; ++i) out.push_back(i * width_s - 0.5 * frame_s);
+  return out;
+}
+
 std::vector<double> shares_percent(const std::vector<double>& values, const std::vector<double>& edges) {
   std::vector<double> shares(edges.size() - 1, 0.0);
   for (const double v : values) {

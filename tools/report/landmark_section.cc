@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "tools/evaluate/statistics.h"
 #include "tools/report/histogram.h"
@@ -22,8 +24,12 @@ std::vector<double> creation_depths(const RunRecord& run) {
   return depths;
 }
 
+// Half of the values of a normal deviate lie within this many sigmas.
+constexpr double kMedianOfNormal = 0.6745;
+
 // Share of the points beyond each distance.
 std::vector<Eigen::Vector2d> shares_beyond(std::vector<double> distances) {
+  std::erase_if(distances, [](double d) { return !std::isfinite(d); });
   std::sort(distances.begin(), distances.end());
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -33,11 +39,27 @@ std::vector<Eigen::Vector2d> shares_beyond(std::vector<double> distances) {
   return points;
 }
 
+// From nearly the nearest to the farthest point of all runs; empty without points.
+std::optional<std::pair<double, double>> range_of_depths(const Runs& runs) {
+  double low = 1e300, high = 0.0;
+  for (const RunRecord& run : runs) {
+    if (run.landmarks() == nullptr) continue;
+    std::vector<double> depths = creation_depths(run);
+    std::erase_if(depths, [](double d) { return !(d > 0.0 && d < 1e9); });
+    if (depths.empty()) continue;
+    low = std::min(low, percentile(depths, 0.2));
+    high = std::max(high, *std::max_element(depths.begin(), depths.end()));
+  }
+  if (!(low < high)) return std::nullopt;
+  return std::pair(low, 1.05 * high);
+}
+
 std::string depth_histogram(const Runs& runs) {
-  const std::string unit = runs[0].length_unit();
-  const std::vector<double> bins = edges(1.0, 2000.0, 48, true);
+  const auto range = range_of_depths(runs);
+  if (!range) return {};
+  const std::vector<double> bins = edges(range->first, range->second, 48, true);
   Plot plot({"Distance at which points were made",
-             {"distance, " + unit, true, 1.0, 2000.0},
+             {"distance, " + runs[0].length_unit(), true, range->first, range->second},
              {"points, % a bin"},
              false,
              520,
@@ -50,9 +72,10 @@ std::string depth_histogram(const Runs& runs) {
 }
 
 std::string beyond_view(const Runs& runs) {
-  const std::string unit = runs[0].length_unit();
+  const auto range = range_of_depths(runs);
+  if (!range) return {};
   Plot plot({"Points made beyond a distance",
-             {"distance, " + unit, true, 10.0, 2000.0},
+             {"distance, " + runs[0].length_unit(), true, range->first, range->second},
              {"share of all points, %", true, 0.01, 100.0},
              false,
              520,
@@ -64,23 +87,27 @@ std::string beyond_view(const Runs& runs) {
   return plot.svg();
 }
 
-std::string truth_view(const Runs& runs, const char* title, const char* y_label, double DistanceBin::*solid,
-                       const char* solid_name, double DistanceBin::*thin, const char* thin_name) {
+struct DistanceCurve {
+  const char* name;
+  double DistanceBin::*value;
+  double factor = 1.0;
+};
+
+// The first curve thick, the second thin.
+std::string truth_view(const Runs& runs, const char* title, const char* y_label,
+                       const std::array<DistanceCurve, 2>& curves) {
   constexpr std::size_t kFewest = 10;
   Plot plot({title, {"true distance, m", true}, {y_label, true}, false, 520, 340});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!runs[i].metrics || !runs[i].metrics->landmarks) continue;
-    std::vector<Eigen::Vector2d> first, second;
-    for (const DistanceBin& bin : runs[i].metrics->landmarks->bins) {
-      if (bin.count < kFewest) continue;
-      const double middle = std::sqrt(std::max(bin.from_m, 5.0) * bin.to_m);
-      first.emplace_back(middle, bin.*solid);
-      if (thin != nullptr) second.emplace_back(middle, bin.*thin);
+    for (std::size_t k = 0; k < curves.size(); ++k) {
+      std::vector<Eigen::Vector2d> points;
+      for (const DistanceBin& bin : runs[i].metrics->landmarks->bins) {
+        const double middle = std::sqrt(std::max(bin.from_m, 5.0) * bin.to_m);
+        if (bin.count >= kFewest) points.emplace_back(middle, curves[k].factor * (bin.*curves[k].value));
+      }
+      plot.line(runs[i].name + ", " + curves[k].name, points, k == 0 ? run_style(i) : thin_run_style(i));
     }
-    plot.line(runs[i].name + ", " + solid_name, first, run_style(i));
-    Style style = run_style(i);
-    style.width_px = 0.9;
-    if (thin != nullptr) plot.line(runs[i].name + ", " + thin_name, second, style);
   }
   return plot.svg();
 }
@@ -126,6 +153,32 @@ double longest_life_s(const Runs& runs) {
   return std::max(std::ceil(longest), 1.0);
 }
 
+double median_step_s(const std::vector<double>& times_s) {
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < times_s.size(); ++i) steps_s.push_back(times_s[i] - times_s[i - 1]);
+  return percentile(std::move(steps_s), 50.0);
+}
+
+// Bins that the spacing of the keyframes, at which points begin and end as VMPs, does not show in.
+std::vector<double> life_edges(const Runs& runs) {
+  constexpr int kMostBins = 40;
+  double frame_s = 0.0, keyframe_s = 0.0;
+  for (const RunRecord& run : runs) {
+    std::vector<double> frames_s, keyframes_s;
+    for (const PublishedFrame& f : run.frames) {
+      frames_s.push_back(f.time_s);
+      if (f.keyframe) keyframes_s.push_back(f.time_s);
+    }
+    const double frame = median_step_s(frames_s), keyframe = median_step_s(keyframes_s);
+    if (frame > frame_s && frame < 1e3) frame_s = frame;
+    if (keyframe > keyframe_s && keyframe < 1e3) keyframe_s = keyframe;
+  }
+  const double longest_s = longest_life_s(runs);
+  if (frame_s <= 0.0 || keyframe_s < frame_s || keyframe_s > longest_s)
+    return edges(0.0, longest_s, kMostBins);
+  return keyframe_edges(longest_s, frame_s, static_cast<int>(std::lround(keyframe_s / frame_s)), kMostBins);
+}
+
 }  // namespace
 
 std::string landmark_section(const Runs& runs) {
@@ -138,13 +191,16 @@ std::string landmark_section(const Runs& runs) {
   if (judged) {
     content +=
         "<p>Against the simulated world: true distance from the camera that first saw a landmark. The "
-        "scale is that of the six seconds around it.</p>\n";
-    content += row_of({truth_view(runs, "Error of distance", "error, % of the true distance",
-                                  &DistanceBin::error_p50_percent, "median", &DistanceBin::error_p90_percent,
-                                  "90th percentile"),
-                       truth_view(runs, "Claimed sigma against real error", "% of the true distance",
-                                  &DistanceBin::error_p50_percent, "median error",
-                                  &DistanceBin::claimed_percent, "claimed sigma")});
+        "scale is that of the six seconds around it. Half of the errors of an honest claim lie within 0.67 "
+        "of its "
+        "sigma.</p>\n";
+    content +=
+        row_of({truth_view(runs, "Error of distance", "error, % of the true distance",
+                           {{{"median", &DistanceBin::error_p50_percent},
+                             {"90th percentile", &DistanceBin::error_p90_percent}}}),
+                truth_view(runs, "Median error against 0.67 of the claimed sigma", "% of the true distance",
+                           {{{"median error", &DistanceBin::error_p50_percent},
+                             {"0.67 sigma claimed", &DistanceBin::claimed_percent, kMedianOfNormal}}})});
     content += births(runs);
   }
   return section(
@@ -155,7 +211,7 @@ std::string landmark_section(const Runs& runs) {
 }
 
 std::string vmp_section(const Runs& runs) {
-  const std::vector<double> bins = edges(0.0, longest_life_s(runs), 40);
+  const std::vector<double> bins = life_edges(runs);
   Plot life(
       {"Life as a virtual map point", {"first sighting to point, s"}, {"points, % a bin"}, false, 520, 320});
   Plot promoted({"Points made through virtual map points",

@@ -39,21 +39,27 @@ std::vector<Eigen::Vector2d> way_of(const RunRecord& run) {
   return way;
 }
 
-// A square about the middle of the way that holds it with `margin` around.
-std::pair<Eigen::Vector2d, double> window(const std::vector<Eigen::Vector2d>& way, double margin) {
+// A square about the middle of the way, and half its side.
+std::pair<Eigen::Vector2d, double> square_around(const std::vector<Eigen::Vector2d>& way) {
   Eigen::Vector2d low = way.front(), high = way.front();
   for (const Eigen::Vector2d& p : way) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  return {0.5 * (low + high), 0.5 * (high - low).maxCoeff() + margin};
+  return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
 }
 
-std::string picture(const RunRecord& run, const std::string& title, double margin) {
+// Around the way: metres, or in map units a share of half the way's extent.
+struct Margin {
+  double metres, share;
+};
+
+std::string picture(const RunRecord& run, const std::string& title, const Margin& margin) {
   const std::vector<Eigen::Vector2d> way = way_of(run);
   if (way.size() < 2) return {};
-  const auto [middle, half] = window(way, margin);
   const std::string unit = run.length_unit();
+  const auto [middle, half_way] = square_around(way);
+  const double half = half_way + (unit == "m" ? margin.metres : margin.share * half_way);
   Plot plot({run.name + ": " + title,
              {"x, " + unit, false, middle.x() - half, middle.x() + half},
              {"y, " + unit, false, middle.y() - half, middle.y() + half},
@@ -74,10 +80,8 @@ std::string map_section(const Runs& runs) {
   std::vector<std::string> pictures;
   for (const RunRecord& run : runs) {
     if (run.landmarks() == nullptr || run.landmarks()->landmarks.empty()) continue;
-    // In map units nothing tells near from far but the way's own size.
-    const bool metric = run.length_unit() == "m";
-    pictures.push_back(picture(run, "near the way", metric ? 60.0 : 5.0));
-    pictures.push_back(picture(run, "distant points too", metric ? 1200.0 : 100.0));
+    pictures.push_back(picture(run, "near the way", {60.0, 0.2}));
+    pictures.push_back(picture(run, "distant points too", {1200.0, 3.0}));
   }
   return section("Map", "Points of the map with most frames, from above, at the end of the run.",
                  row_of(pictures));

@@ -4,28 +4,34 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+
+#include "tools/report/colours.h"
 
 namespace farpoint::tools::report {
 namespace {
 
 constexpr double kLeft_px = 62, kRight_px = 14, kTop_px = 30, kBottom_px = 44, kLegendRow_px = 17;
+constexpr double kLetter_px = 7.0, kLegendLine_px = 36;
 // More points than this a line cannot show.
 constexpr std::size_t kMostPoints = 1500;
 
-std::vector<Eigen::Vector2d> thinned(std::vector<Eigen::Vector2d> points) {
-  if (points.size() <= kMostPoints) return points;
-  const std::size_t step = (points.size() + kMostPoints - 1) / kMostPoints;
-  std::vector<Eigen::Vector2d> kept;
-  for (std::size_t i = 0; i < points.size(); i += step) kept.push_back(points[i]);
-  kept.push_back(points.back());
-  return kept;
+std::string precise(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return text;
 }
 
-// Digits after the point that tell neighbouring ticks apart.
-std::string tick_text(double value, double step, bool is_log) {
-  if (is_log) return number(value, value < 1.0 ? 3 : 0);
-  const int digits = step >= 1.0 ? 0 : static_cast<int>(std::ceil(-std::log10(step) - 1e-9));
-  return number(value, std::min(digits, 6));
+// What the script needs to turn pixels into values.
+std::string range_attribute(const char* name, const Scale& scale) {
+  return std::string(" ") + name + "=\"" + precise(scale.low) + " " + precise(scale.high) +
+         (scale.is_log ? " log\"" : " linear\"");
+}
+
+// Cuts a name to the given width.
+std::string shortened(const std::string& text, double room_px) {
+  const auto most = static_cast<std::size_t>(std::max(room_px / kLetter_px, 8.0));
+  return text.size() <= most ? text : text.substr(0, most - 2) + "..";
 }
 
 }  // namespace
@@ -38,6 +44,12 @@ Style run_style(std::size_t n) {
   return kStyles[n % kStyles.size()];
 }
 
+Style thin_run_style(std::size_t n) {
+  Style style = run_style(n);
+  style.width_px = 0.9;
+  return style;
+}
+
 Style truth_style() {
   return {"#777", "", 4.0};
 }
@@ -47,39 +59,39 @@ std::string stroke(const Style& style) {
          (style.dash.empty() ? "" : " stroke-dasharray=\"" + style.dash + "\"");
 }
 
-std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
-  // Beyond the precision of a double no step moves a value on.
-  constexpr int kMostSteps = 1000;
-  std::vector<double> values;
-  if (is_log) {
-    const bool wide = high / low > 2e3;
-    double decade = std::pow(10.0, std::floor(std::log10(low)));
-    for (int i = 0; i < kMostSteps && decade <= high; ++i, decade *= 10.0) {
-      for (const double m : {1.0, 2.0, 5.0}) {
-        if (wide && m > 1.0) continue;
-        if (m * decade >= low * 0.999 && m * decade <= high * 1.001) values.push_back(m * decade);
+std::vector<Eigen::Vector2d> thinned(const std::vector<Eigen::Vector2d>& points, std::size_t most) {
+  constexpr std::size_t kOfAStretch = 3;
+  if (points.size() <= most || most == 0) return points;
+  const std::size_t stretch = (kOfAStretch * points.size() + most - 1) / most;
+  std::vector<Eigen::Vector2d> kept;
+  for (std::size_t begin = 0; begin < points.size(); begin += stretch) {
+    const std::size_t end = std::min(begin + stretch, points.size());
+    std::size_t lowest = begin, highest = begin, broken = end;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!points[i].allFinite()) {
+        broken = i;
+        continue;
       }
+      if (!(points[i].y() >= points[lowest].y())) lowest = i;
+      if (!(points[i].y() <= points[highest].y())) highest = i;
     }
-    return values;
+    std::array<std::size_t, 4> order = {begin, lowest, highest, broken};
+    std::sort(order.begin(), order.end());
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      if (order[k] < end && (k == 0 || order[k] != order[k - 1])) kept.push_back(points[order[k]]);
+    }
   }
-  const double raw = (high - low) / wanted, power = std::pow(10.0, std::floor(std::log10(raw)));
-  double step = 10.0 * power;
-  for (const double m : {5.0, 2.0, 1.0}) {
-    if (m * power >= raw) step = m * power;
-  }
-  double v = std::ceil(low / step - 1e-9) * step;
-  for (int i = 0; i < kMostSteps && v <= high + 1e-9 * step; ++i, v += step)
-    values.push_back(std::abs(v) < 1e-9 * step ? 0.0 : v);
-  return values;
+  kept.push_back(points.back());
+  return kept;
 }
 
-void Plot::line(const std::string& name, std::vector<Eigen::Vector2d> points, const Style& style) {
-  layers_.push_back({name, thinned(std::move(points)), style, true, false, 0.0});
+void Plot::line(const std::string& name, const std::vector<Eigen::Vector2d>& points, const Style& style) {
+  layers_.push_back({Kind::kLine, name, thinned(points, kMostPoints), style, 0.0, {}});
 }
 
 void Plot::dots(const std::string& name, std::vector<Eigen::Vector2d> points, const std::string& colour,
                 double side_px) {
-  layers_.push_back({name, std::move(points), {colour, "", 1.0}, false, false, side_px});
+  layers_.push_back({Kind::kDots, name, std::move(points), {colour, "", 1.0}, side_px, {}});
 }
 
 void Plot::steps(const std::string& name, const std::vector<double>& edges, const std::vector<double>& values,
@@ -91,45 +103,87 @@ void Plot::steps(const std::string& name, const std::vector<double>& edges, cons
     points.emplace_back(edges[i + 1], values[i]);
   }
   points.emplace_back(edges.back(), 0.0);
-  layers_.push_back({name, std::move(points), style, true, false, 0.0});
+  layers_.push_back({Kind::kLine, name, std::move(points), style, 0.0, {}});
 }
 
 void Plot::mark_x(const std::string& name, double x, const Style& style) {
-  layers_.push_back({name, {{x, 0.0}}, style, true, true, 0.0});
+  layers_.push_back({Kind::kMarkX, name, {{x, NAN}}, style, 0.0, {}});
 }
 
-double Plot::Scale::share(double value) const {
-  if (!is_log) return (value - low) / (high - low);
-  return (std::log(std::max(value, 1e-12)) - std::log(low)) / (std::log(high) - std::log(low));
+void Plot::mark_y(const std::string& name, double y, const Style& style) {
+  layers_.push_back({Kind::kMarkY, name, {{NAN, y}}, style, 0.0, {}});
 }
 
-Plot::Scale Plot::scale_of(const Axis& axis, int dimension) const {
-  double low = 1e300, high = -1e300;
+void Plot::coloured_line(std::vector<Eigen::Vector2d> points, ColouredValues values) {
+  layers_.push_back({Kind::kColoured, "", std::move(points), {"#000", "", 3.0}, 0.0, std::move(values)});
+}
+
+void Plot::label_point(const std::string& word, const Eigen::Vector2d& at) {
+  layers_.push_back({Kind::kLabel, word, {at}, {"#000", "", 1.6}, 0.0, {}});
+}
+
+Plot::Scales Plot::scales() const {
+  std::vector<double> xs, ys;
   for (const Layer& layer : layers_) {
-    if (layer.is_mark && dimension == 1) continue;
     for (const Eigen::Vector2d& p : layer.points) {
-      if (!std::isfinite(p[dimension]) || (axis.is_log && p[dimension] <= 0.0)) continue;
-      low = std::min(low, p[dimension]);
-      high = std::max(high, p[dimension]);
+      xs.push_back(p.x());
+      ys.push_back(p.y());
     }
   }
-  if (low > high) low = axis.is_log ? 1.0 : 0.0, high = axis.is_log ? 10.0 : 1.0;
-  const bool narrow = high - low < 1e-9 * std::max(1.0, std::abs(high));
-  if (axis.is_log) {
-    if (narrow) high = 2.0 * low;
-  } else {
-    const double margin = narrow ? 0.5 : 0.04 * (high - low);
-    // Where the data begin at zero, so does the axis.
-    low = low >= 0.0 && low < 0.3 * high ? 0.0 : low - margin;
-    high += margin;
+  Scales scales{scale_around(frame_.x, xs, !frame_.equal_units),
+                scale_around(frame_.y, ys, !frame_.equal_units)};
+  if (!frame_.equal_units) return scales;
+  // The axis with room to spare is widened.
+  const double x_unit = (scales.x.high - scales.x.low) / area_px().x(),
+               y_unit = (scales.y.high - scales.y.low) / area_px().y();
+  Scale& wider = x_unit < y_unit ? scales.x : scales.y;
+  const double factor = x_unit < y_unit ? y_unit / x_unit : x_unit / y_unit;
+  const double middle = 0.5 * (wider.low + wider.high), half = 0.5 * (wider.high - wider.low) * factor;
+  wider.low = middle - half;
+  wider.high = middle + half;
+  return scales;
+}
+
+bool Plot::shows_something(const Scales& scales) const {
+  const auto is_inside = [&](const Eigen::Vector2d& p) {
+    return scales.x.holds(p.x()) && scales.y.holds(p.y());
+  };
+  return std::any_of(layers_.begin(), layers_.end(), [&](const Layer& layer) {
+    if (layer.kind == Kind::kMarkX || layer.kind == Kind::kMarkY || layer.kind == Kind::kLabel) return false;
+    const auto inside = std::count_if(layer.points.begin(), layer.points.end(), is_inside);
+    return inside >= (layer.kind == Kind::kDots ? 1 : 2);
+  });
+}
+
+std::vector<const Plot::Layer*> Plot::named_layers() const {
+  std::vector<const Layer*> named;
+  for (const Layer& layer : layers_) {
+    if (!layer.name.empty() && layer.kind != Kind::kLabel) named.push_back(&layer);
   }
-  return {axis.low.value_or(low), axis.high.value_or(high), axis.is_log};
+  return named;
+}
+
+const Plot::Layer* Plot::coloured_layer() const {
+  for (const Layer& layer : layers_) {
+    if (layer.kind == Kind::kColoured) return &layer;
+  }
+  return nullptr;
+}
+
+double Plot::width_px() const {
+  return frame_.width_px - kLeft_px - kRight_px;
+}
+
+int Plot::legend_columns() const {
+  std::size_t longest = 0;
+  for (const Layer* layer : named_layers()) longest = std::max(longest, layer->name.size());
+  return kLegendLine_px + kLetter_px * static_cast<double>(longest) < 0.5 * width_px() ? 2 : 1;
 }
 
 double Plot::legend_px() const {
-  double rows = 0.0;
-  for (const Layer& layer : layers_) rows += layer.name.empty() ? 0.0 : 1.0;
-  return rows > 0.0 ? kLegendRow_px * std::ceil(rows / 2.0) + 4.0 : 0.0;
+  double rows = std::ceil(static_cast<double>(named_layers().size()) / legend_columns());
+  if (coloured_layer() != nullptr) rows += 2.0;
+  return rows > 0.0 ? kLegendRow_px * rows + 4.0 : 0.0;
 }
 
 Eigen::Vector2d Plot::corner_px() const {
@@ -137,89 +191,162 @@ Eigen::Vector2d Plot::corner_px() const {
 }
 
 Eigen::Vector2d Plot::area_px() const {
-  return {frame_.width_px - kLeft_px - kRight_px, frame_.height_px - kTop_px - kBottom_px - legend_px()};
+  return {width_px(), frame_.height_px - kTop_px - kBottom_px - legend_px()};
 }
 
-Eigen::Vector2d Plot::place(const Scale& x, const Scale& y, const Eigen::Vector2d& p) const {
+Eigen::Vector2d Plot::place(const Scales& scales, const Eigen::Vector2d& p) const {
   // Kept within reason: far outside the area numbers would only get long.
-  const double u = std::clamp(x.share(p.x()), -2.0, 3.0), v = std::clamp(y.share(p.y()), -2.0, 3.0);
+  const double u = std::clamp(scales.x.share(p.x()), -2.0, 3.0),
+               v = std::clamp(scales.y.share(p.y()), -2.0, 3.0);
   return corner_px() + Eigen::Vector2d(u * area_px().x(), (1.0 - v) * area_px().y());
 }
 
-void Plot::draw_axes(const Scale& x, const Scale& y, Svg* svg) const {
+void Plot::draw_axes(const Scales& scales, Svg* svg) const {
   const Eigen::Vector2d corner = corner_px(), area = area_px();
   const double bottom = corner.y() + area.y();
-  const std::vector<double> xs = ticks(x.low, x.high, 7, x.is_log), ys = ticks(y.low, y.high, 6, y.is_log);
+  const auto step_of = [](const std::vector<double>& values) {
+    return values.size() > 1 ? values[1] - values[0] : 1.0;
+  };
+  const std::vector<double> xs = ticks(scales.x.low, scales.x.high, 7, scales.x.is_log),
+                            ys = ticks(scales.y.low, scales.y.high, 6, scales.y.is_log);
+  svg->begin_group("class=\"ticks\"");
   for (const double value : xs) {
-    const double at = corner.x() + x.share(value) * area.x();
+    const double at = corner.x() + scales.x.share(value) * area.x();
     svg->line({at, corner.y()}, {at, bottom}, "class=\"grid\"");
-    svg->text({at, bottom + 15}, tick_text(value, xs.size() > 1 ? xs[1] - xs[0] : 1.0, x.is_log),
-              Anchor::kMiddle);
+    svg->text({at, bottom + 15}, tick_text(value, step_of(xs), scales.x.is_log), Anchor::kMiddle);
   }
   for (const double value : ys) {
-    const double at = bottom - y.share(value) * area.y();
+    const double at = bottom - scales.y.share(value) * area.y();
     svg->line({corner.x(), at}, {corner.x() + area.x(), at}, "class=\"grid\"");
-    svg->text({corner.x() - 6, at + 4}, tick_text(value, ys.size() > 1 ? ys[1] - ys[0] : 1.0, y.is_log),
-              Anchor::kEnd);
+    svg->text({corner.x() - 6, at + 4}, tick_text(value, step_of(ys), scales.y.is_log), Anchor::kEnd);
   }
+  svg->end_group();
   svg->rectangle(corner, area, "class=\"frame\"");
   svg->text({corner.x() + 0.5 * area.x(), bottom + 34}, frame_.x.label, Anchor::kMiddle);
   svg->turned_text({14, corner.y() + 0.5 * area.y()}, frame_.y.label);
   svg->text({corner.x(), 18}, frame_.title, Anchor::kStart, "class=\"title\"");
 }
 
-void Plot::draw_layers(const Scale& x, const Scale& y, Svg* svg) const {
-  svg->begin_clip(corner_px(), area_px());
-  for (const Layer& layer : layers_) {
-    if (layer.is_mark) {
-      const double at = place(x, y, {layer.points[0].x(), y.low}).x();
-      svg->line({at, corner_px().y()}, {at, corner_px().y() + area_px().y()}, stroke(layer.style));
+void Plot::draw_line(const Layer& layer, const Scales& scales, Svg* svg) const {
+  const std::string attributes = stroke(layer.style) + " data-name=\"" + escaped(layer.name) + "\"";
+  std::vector<Eigen::Vector2d> piece;
+  for (const Eigen::Vector2d& p : layer.points) {
+    if (p.allFinite()) {
+      piece.push_back(place(scales, p));
       continue;
     }
-    std::vector<Eigen::Vector2d> points;
-    for (const Eigen::Vector2d& p : layer.points) {
-      if (p.allFinite()) points.push_back(place(x, y, p));
-    }
-    if (layer.is_line)
-      svg->polyline(points, stroke(layer.style));
-    else
-      svg->dots(points, layer.side_px, "fill=\"" + layer.style.colour + "\"");
+    svg->polyline(piece, attributes);
+    piece.clear();
   }
+  svg->polyline(piece, attributes);
+}
+
+// Neighbouring pieces of one level are one element.
+void Plot::draw_coloured(const Layer& layer, const Scales& scales, Svg* svg) const {
+  std::vector<Eigen::Vector2d> piece;
+  int level = 0;
+  const auto finish = [&] {
+    svg->polyline(piece,
+                  stroke({level_colour(level), "", layer.style.width_px}) + " stroke-linecap=\"round\"");
+    piece.clear();
+  };
+  for (std::size_t i = 0; i < std::min(layer.points.size(), layer.colours.values.size()); ++i) {
+    if (!layer.points[i].allFinite()) {
+      finish();
+      continue;
+    }
+    const Eigen::Vector2d at = place(scales, layer.points[i]);
+    piece.push_back(at);
+    const int next = colour_level(layer.colours.values[i], layer.colours.low, layer.colours.high);
+    if (next == level) continue;
+    finish();
+    piece.push_back(at);
+    level = next;
+  }
+  finish();
+}
+
+void Plot::draw_layer(const Layer& layer, const Scales& scales, Svg* svg) const {
+  const Eigen::Vector2d corner = corner_px(), end = corner_px() + area_px();
+  switch (layer.kind) {
+    case Kind::kLine:
+      return draw_line(layer, scales, svg);
+    case Kind::kColoured:
+      return draw_coloured(layer, scales, svg);
+    case Kind::kMarkX: {
+      const double at = place(scales, {layer.points[0].x(), scales.y.low}).x();
+      return svg->line({at, corner.y()}, {at, end.y()}, stroke(layer.style));
+    }
+    case Kind::kMarkY: {
+      const double at = place(scales, {scales.x.low, layer.points[0].y()}).y();
+      return svg->line({corner.x(), at}, {end.x(), at}, stroke(layer.style));
+    }
+    case Kind::kLabel: {
+      if (!layer.points[0].allFinite()) return;
+      const Eigen::Vector2d at = place(scales, layer.points[0]);
+      svg->circle(at, 5.0, "fill=\"#fff\" " + stroke(layer.style));
+      const bool is_right = at.x() + kLetter_px * static_cast<double>(layer.name.size()) + 12.0 > end.x();
+      return svg->text(at + Eigen::Vector2d(is_right ? -9 : 9, at.y() < corner.y() + 20.0 ? 16 : -6),
+                       layer.name, is_right ? Anchor::kEnd : Anchor::kStart, "class=\"mark\"");
+    }
+    case Kind::kDots: {
+      std::vector<Eigen::Vector2d> points;
+      for (const Eigen::Vector2d& p : layer.points) {
+        if (p.allFinite()) points.push_back(place(scales, p));
+      }
+      return svg->dots(points, layer.side_px, layer.style.colour);
+    }
+  }
+}
+
+void Plot::draw_layers(const Scales& scales, Svg* svg) const {
+  svg->begin_clip(corner_px(), area_px());
+  for (const Layer& layer : layers_) draw_layer(layer, scales, svg);
   svg->end_clip();
 }
 
+void Plot::draw_colour_bar(const Layer& layer, double top_px, Svg* svg) const {
+  constexpr double kBox_px = 13;
+  const double bar_px = kBox_px * kColourLevels;
+  for (int i = 0; i < kColourLevels; ++i)
+    svg->rectangle({kLeft_px + kBox_px * i, top_px}, {kBox_px + 0.5, 9}, "fill=\"" + level_colour(i) + "\"");
+  const double step = (layer.colours.high - layer.colours.low) / 10.0;
+  svg->text({kLeft_px, top_px + 22}, tick_text(layer.colours.low, step, false), Anchor::kStart);
+  svg->text({kLeft_px + bar_px, top_px + 22}, tick_text(layer.colours.high, step, false) + " and more",
+            Anchor::kMiddle);
+  svg->text({kLeft_px + bar_px + 12, top_px + 9}, layer.colours.label, Anchor::kStart);
+}
+
 void Plot::draw_legend(Svg* svg) const {
+  double top = frame_.height_px - legend_px() + 10.0;
+  const int columns = legend_columns();
+  const double room_px = width_px() / columns;
   int n = 0;
-  const double top = frame_.height_px - legend_px() + 10.0;
-  for (const Layer& layer : layers_) {
-    if (layer.name.empty()) continue;
-    const Eigen::Vector2d at(kLeft_px + (n % 2) * 0.5 * area_px().x(), top + (n / 2) * kLegendRow_px);
-    if (layer.is_line)
-      svg->line(at, at + Eigen::Vector2d(30, 0), stroke(layer.style));
+  for (const Layer* layer : named_layers()) {
+    const int row = n / columns, column = n % columns;
+    const Eigen::Vector2d at(kLeft_px + column * room_px, top + row * kLegendRow_px);
+    if (layer->kind == Kind::kDots)
+      svg->rectangle(at + Eigen::Vector2d(12, -4), {8, 8}, "fill=\"" + layer->style.colour + "\"");
     else
-      svg->rectangle(at + Eigen::Vector2d(12, -4), {8, 8}, "fill=\"" + layer.style.colour + "\"");
-    svg->text(at + Eigen::Vector2d(36, 4), layer.name, Anchor::kStart);
+      svg->line(at, at + Eigen::Vector2d(30, 0), stroke(layer->style));
+    svg->text(at + Eigen::Vector2d(kLegendLine_px, 4), shortened(layer->name, room_px - kLegendLine_px),
+              Anchor::kStart);
     ++n;
   }
+  const int rows = (n + columns - 1) / columns;
+  top += kLegendRow_px * rows;
+  if (const Layer* layer = coloured_layer()) draw_colour_bar(*layer, top - 4.0, svg);
 }
 
 std::string Plot::svg() const {
-  if (layers_.empty()) return {};
-  Scale x = scale_of(frame_.x, 0), y = scale_of(frame_.y, 1);
-  if (frame_.equal_units) {
-    // The axis with room to spare is widened.
-    const double x_unit = (x.high - x.low) / area_px().x(), y_unit = (y.high - y.low) / area_px().y();
-    Scale& wider = x_unit < y_unit ? x : y;
-    const double factor = x_unit < y_unit ? y_unit / x_unit : x_unit / y_unit;
-    const double middle = 0.5 * (wider.low + wider.high), half = 0.5 * (wider.high - wider.low) * factor;
-    wider.low = middle - half;
-    wider.high = middle + half;
-  }
+  const Scales ranges = scales();
+  if (!shows_something(ranges)) return {};
   Svg svg(frame_.width_px, frame_.height_px);
-  draw_axes(x, y, &svg);
-  draw_layers(x, y, &svg);
+  draw_axes(ranges, &svg);
+  draw_layers(ranges, &svg);
   draw_legend(&svg);
-  return svg.finish(frame_.title);
+  return svg.finish(frame_.title, range_attribute("data-x", ranges.x) + range_attribute("data-y", ranges.y) +
+                                      (frame_.equal_units ? " data-equal=\"1\"" : ""));
 }
 
 }  // namespace farpoint::tools::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A report on runs as one HTML file that needs nothing else: no network, no script.
+// A report on runs as one HTML file that needs nothing else: no network, no script but its own.
 #pragma once
 
 #include <filesystem>
@@ -15,8 +15,17 @@ struct ReportRequest {
   std::filesystem::path truth;              // the recording, or a TUM file; may be empty
 };
 
-// Throws InputError for a file that cannot be read.
-[[nodiscard]] std::string make_report(const ReportRequest& request);
+struct Report {
+  struct Table {
+    std::string run;  // its name
+    std::string csv;
+  };
+  std::string page;
+  std::vector<Table> tables;  // one a run: a row a frame (frame_table.h)
+};
+
+// A recording without GROUND_TRUTH gives its images only. Throws InputError for a file that cannot be read.
+[[nodiscard]] Report make_report(const ReportRequest& request);
 
 // Figures of runs without truth, for machines: {"runs": [{"name", "work", "frames", "memory"}]}. Throws
 // InputError for a file that cannot be read.

@@ -111,15 +111,13 @@ void Svg::turned_text(const Eigen::Vector2d& at, std::string_view text) {
                    escaped(text), "</text>\n"});
 }
 
-void Svg::dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::string_view attributes) {
+// Each is a stroke without length, whose square cap is drawn.
+void Svg::dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::string_view colour) {
   if (points.empty()) return;
-  const std::string side = number(side_px, 1);
-  body_ += "<path d=\"";
-  for (const Eigen::Vector2d& p : points) {
-    const Eigen::Vector2d corner = p - Eigen::Vector2d::Constant(0.5 * side_px);
-    body_ += joined({"M", pair_text(corner), "h", side, "v", side, "h-", side, "z"});
-  }
-  body_ += joined({"\" ", attributes, "/>\n"});
+  body_ += joined({"<path stroke=\"", colour, "\" stroke-width=\"", number(side_px, 1),
+                   "\" stroke-linecap=\"square\" d=\""});
+  for (const Eigen::Vector2d& p : points) body_ += joined({"M", pair_text(p), "h0"});
+  body_ += "\"/>\n";
 }
 
 void Svg::jpeg(const std::vector<std::uint8_t>& bytes, double width_px, double height_px) {
@@ -129,21 +127,29 @@ void Svg::jpeg(const std::vector<std::uint8_t>& bytes, double width_px, double h
 
 // A drawing within the drawing, which cuts off by itself: clip paths would need ids that the page has once.
 void Svg::begin_clip(const Eigen::Vector2d& corner, const Eigen::Vector2d& size) {
-  body_ +=
-      joined({"<svg", attribute("x", corner.x()), attribute("y", corner.y()), attribute("width", size.x()),
-              attribute("height", size.y()), " viewBox=\"", number(corner.x(), 1), " ", number(corner.y(), 1),
-              " ", number(size.x(), 1), " ", number(size.y(), 1), "\">\n"});
+  body_ += joined({"<svg class=\"area\" preserveAspectRatio=\"none\"", attribute("x", corner.x()),
+                   attribute("y", corner.y()), attribute("width", size.x()), attribute("height", size.y()),
+                   " viewBox=\"", number(corner.x(), 1), " ", number(corner.y(), 1), " ", number(size.x(), 1),
+                   " ", number(size.y(), 1), "\">\n"});
+}
+
+void Svg::begin_group(std::string_view attributes) {
+  body_ += joined({"<g ", attributes, ">\n"});
+}
+
+void Svg::end_group() {
+  body_ += "</g>\n";
 }
 
 void Svg::end_clip() {
   body_ += "</svg>\n";
 }
 
-std::string Svg::finish(std::string_view title) const {
+std::string Svg::finish(std::string_view title, std::string_view attributes) const {
   const std::string width = number(width_px_, 0), height = number(height_px_, 0);
   return joined({"<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"", width, "\" height=\"",
-                 height, "\" viewBox=\"0 0 ", width, " ", height, "\"><title>", escaped(title), "</title>\n",
-                 body_, "</svg>\n"});
+                 height, "\" viewBox=\"0 0 ", width, " ", height, "\"", attributes, "><title>",
+                 escaped(title), "</title>\n", body_, "</svg>\n"});
 }
 
 }  // namespace farpoint::tools::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SVG as text: shapes in pixels, y down, attributes by style classes of the page (tools/report/page.h).
+// SVG as text: shapes in pixels, y down, attributes by style classes of the page (html.cc).
 #pragma once
 
 #include <Eigen/Core>
@@ -29,15 +29,17 @@ class Svg {
   void text(const Eigen::Vector2d& at, std::string_view text, Anchor anchor,
             std::string_view attributes = "");
   void turned_text(const Eigen::Vector2d& at, std::string_view text);  // reads upwards, centred
-  // Many small squares as one path element.
-  void dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::string_view attributes);
+  // Many small squares as one path element; they keep their size where the page's script zooms.
+  void dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::string_view colour);
   void jpeg(const std::vector<std::uint8_t>& bytes, double width_px, double height_px);
+  void begin_group(std::string_view attributes);
+  void end_group();
   // Clips what is added between the two calls at the rectangle.
   void begin_clip(const Eigen::Vector2d& corner, const Eigen::Vector2d& size);
   void end_clip();
 
-  // The whole element; `title` is the text for screen readers.
-  [[nodiscard]] std::string finish(std::string_view title) const;
+  // The whole element; `title` is the text for screen readers, `attributes` begins with a blank or is empty.
+  [[nodiscard]] std::string finish(std::string_view title, std::string_view attributes = {}) const;
 
  private:
   double width_px_, height_px_;

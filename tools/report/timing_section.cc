@@ -12,6 +12,9 @@
 namespace farpoint::tools::report {
 namespace {
 
+// No stage of the messages: what the process used besides the stages that a threaded run measures.
+constexpr int kAllElse = -1;
+
 struct Stage {
   int index;
   const char* name;
@@ -23,10 +26,33 @@ constexpr std::array kStages = {
     Stage{timing_t::STAGE_POSE, "  pose"},          Stage{timing_t::STAGE_KEYFRAME, "  keyframe"},
     Stage{timing_t::STAGE_MAPPING, "mapping, all"}, Stage{timing_t::STAGE_TRIANGULATION, "  triangulation"},
     Stage{timing_t::STAGE_FUSING, "  fusing"},      Stage{timing_t::STAGE_LOCAL_BA, "  local BA"},
-    Stage{timing_t::STAGE_CULLING, "  culling"},    Stage{timing_t::STAGE_OUTPUT, "output"}};
+    Stage{timing_t::STAGE_CULLING, "  culling"},    Stage{kAllElse, "mapping and rest"},
+    Stage{timing_t::STAGE_OUTPUT, "output"}};
+
+// CPU of the process from one frame's output to the next, without decoding, tracking and output. Empty in
+// lockstep, where mapping is measured itself.
+std::vector<Eigen::Vector2d> all_else_ms(const RunRecord& run) {
+  std::vector<Eigen::Vector2d> points;
+  if (!run.is_threaded()) return points;
+  for (std::size_t i = 1; i < run.timings.size(); ++i) {
+    const timing_t& t = run.timings[i];
+    double ms = 1e3 * (t.process_cpu_s - run.timings[i - 1].process_cpu_s);
+    for (const int stage :
+         std::array<int, 3>{timing_t::STAGE_DECODE, timing_t::STAGE_TRACKING, timing_t::STAGE_OUTPUT})
+      ms -= std::max(t.cpu_ms[stage], 0.0);
+    points.emplace_back(seconds_of(t.utime) - run.start_s, std::max(ms, 0.0));
+  }
+  return points;
+}
 
 std::vector<double> times_ms(const RunRecord& run, int stage) {
   std::vector<double> values;
+  if (stage == kAllElse) {
+    const std::vector<Eigen::Vector2d> points = all_else_ms(run);
+    values.reserve(points.size());
+    for (const Eigen::Vector2d& p : points) values.push_back(p.y());
+    return values;
+  }
   for (const timing_t& t : run.timings) {
     if (t.cpu_ms[stage] >= 0.0) values.push_back(t.cpu_ms[stage]);
   }
@@ -42,6 +68,21 @@ double deadline_ms(const Runs& runs) {
   return 0.0;
 }
 
+void mark_deadline(const Runs& runs, double high_ms, Plot* plot) {
+  const double deadline = deadline_ms(runs);
+  if (deadline > 0.0 && deadline < 4.0 * high_ms)
+    plot->mark_x("deadline, " + number(deadline, 0) + " ms", deadline, {"#000", "3 3", 1.5});
+}
+
+std::vector<Eigen::Vector2d> tracking_points(const RunRecord& run) {
+  std::vector<Eigen::Vector2d> points;
+  for (const timing_t& t : run.timings) {
+    const double ms = t.cpu_ms[timing_t::STAGE_TRACKING];
+    if (ms >= 0.0) points.emplace_back(seconds_of(t.utime) - run.start_s, ms);
+  }
+  return points;
+}
+
 std::string tracking_histogram(const Runs& runs) {
   double high = 0.0;
   for (const RunRecord& run : runs) {
@@ -49,15 +90,66 @@ std::string tracking_histogram(const Runs& runs) {
     if (!ms.empty()) high = std::max(high, percentile(ms, 99.8));
   }
   if (high <= 0.0) return {};
-  const double deadline = deadline_ms(runs);
   const std::vector<double> bins = edges(0.0, 1.05 * high, 60);
   Plot plot({"Tracking, CPU time a frame", {"CPU time, ms"}, {"frames, %"}, false, 520, 320});
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const std::vector<double> ms = times_ms(runs[i], timing_t::STAGE_TRACKING);
     if (!ms.empty()) plot.steps(runs[i].name, bins, shares_percent(ms, bins), run_style(i));
   }
-  if (deadline > 0.0 && deadline < 4.0 * high)
-    plot.mark_x("deadline, " + number(deadline, 0) + " ms", deadline, {"#000", "3 3", 1.5});
+  mark_deadline(runs, high, &plot);
+  return plot.svg();
+}
+
+std::string latency_histogram(const Runs& runs) {
+  double high = 0.0;
+  std::vector<std::vector<double>> latencies_ms;
+  for (const RunRecord& run : runs) {
+    latencies_ms.emplace_back();
+    for (const timing_t& t : run.timings) {
+      if (t.latency_ms >= 0.0) latencies_ms.back().push_back(t.latency_ms);
+    }
+    if (!latencies_ms.back().empty()) high = std::max(high, percentile(latencies_ms.back(), 99.8));
+  }
+  if (high <= 0.0) return {};
+  const std::vector<double> bins = edges(0.0, 1.05 * high, 60);
+  Plot plot({"Latency, mid-exposure to output", {"latency, ms"}, {"frames, %"}, false, 520, 320});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (latencies_ms[i].empty()) continue;
+    const double most = *std::max_element(latencies_ms[i].begin(), latencies_ms[i].end());
+    plot.steps(runs[i].name + ", most " + number(most, 1) + " ms", bins,
+               shares_percent(latencies_ms[i], bins), run_style(i));
+  }
+  mark_deadline(runs, high, &plot);
+  return plot.svg();
+}
+
+// Means of about a second, so that frames with a keyframe and those without do not make a band.
+std::vector<Eigen::Vector2d> means_of_a_second(const std::vector<Eigen::Vector2d>& points) {
+  std::vector<Eigen::Vector2d> means;
+  for (std::size_t begin = 0; begin < points.size();) {
+    std::size_t end = begin;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    for (; end < points.size() && points[end].x() < points[begin].x() + 1.0; ++end) sum += points[end];
+    if (end == begin) break;  // not a time
+    means.push_back(sum / static_cast<double>(end - begin));
+    begin = end;
+  }
+  return means;
+}
+
+std::string load_over_time(const Runs& runs) {
+  Plot plot({"CPU time a frame, mean of a second",
+             {"time since the first frame, s"},
+             {"CPU time, ms a frame", false, 0.0},
+             false,
+             520,
+             320});
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::vector<Eigen::Vector2d> all_else = means_of_a_second(all_else_ms(runs[i]));
+    if (all_else.empty()) continue;
+    plot.line(runs[i].name + ", tracking", means_of_a_second(tracking_points(runs[i])), run_style(i));
+    plot.line(runs[i].name + ", mapping and rest", all_else, thin_run_style(i));
+  }
   return plot.svg();
 }
 
@@ -65,11 +157,7 @@ std::string tracking_histogram(const Runs& runs) {
 std::string tracking_over_time(const Runs& runs) {
   Plot plot({"Tracking over time", {"time since the first frame, s"}, {"CPU time, ms"}, false, 520, 320});
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    std::vector<Eigen::Vector2d> points;
-    for (const timing_t& t : runs[i].timings) {
-      const double ms = t.cpu_ms[timing_t::STAGE_TRACKING];
-      if (ms >= 0.0) points.emplace_back(seconds_of(t.utime) - runs[i].start_s, ms);
-    }
+    const std::vector<Eigen::Vector2d> points = tracking_points(runs[i]);
     Style style = run_style(i);
     style.width_px = 1.0;
     if (!points.empty()) plot.line(runs[i].name, points, style);
@@ -150,9 +238,11 @@ std::string timing_section(const Runs& runs) {
   if (histogram.empty() && bars.empty()) return {};
   return section(
       "Timing",
-      "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed "
-      "to the output; mapping works beside it in a threaded run.",
-      row_of({histogram, tracking_over_time(runs), bars}));
+      "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed to the "
+      "output; mapping works beside it in a threaded run, whose messages have no time of mapping or its "
+      "stages: "
+      "'mapping and rest' is the CPU time of the process without decoding, tracking and output.",
+      row_of({histogram, tracking_over_time(runs), latency_histogram(runs), load_over_time(runs), bars}));
 }
 
 }  // namespace farpoint::tools::report

@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "slam/frame_result.h"
+#include "tools/evaluate/own_metrics.h"
 
 namespace farpoint::tools {
 namespace {
 
-constexpr double kStale_s = 1.0;  // the status comes five times a second
+constexpr double kStale_s = 1.0;    // the status comes five times a second
+constexpr double kInTime_s = 0.25;  // an older pose is no longer valid on CAN
 constexpr double kMegabyte = 1e6, kDegrees_per_rad = 57.29577951308232;
 
 constexpr const char *kRed = "\x1b[1;31m", *kYellow = "\x1b[1;33m", *kGreen = "\x1b[1;32m",
@@ -45,6 +47,37 @@ std::string missing_functions(std::int32_t bits) {
   for (const Name& name : kNames)
     if ((bits & name.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name.text);
   return text;
+}
+
+// Why a state gives no valid pose, in the words of the CAN signal Reason.
+const char* reason_of(int state) {
+  switch (state) {
+    case status_t::STATE_STARTING:
+      return "no image yet";
+    case status_t::STATE_INITIALISING:
+      return "map not started: it needs two views with parallax and many matches";
+    case status_t::STATE_SETTLING:
+      return "the young map's scale is settling";
+    case status_t::STATE_DEGRADED:
+      return "few landmarks";
+    case status_t::STATE_LOST:
+      return "tracking lost";
+    case status_t::STATE_RELOCALISING:
+      return "place not recognised yet";
+    case status_t::STATE_NO_CAMERA:
+      return "no camera: none answers, or it is silent";
+    default:
+      return "";
+  }
+}
+
+// Root of the trace of one 3x3 block: the size of the error; a dash where it is unknown.
+std::string sigmas(const double covariance[6][6], int first, double factor, const char* unit) {
+  double variance = 0.0;
+  for (int i = first; i < first + 3; ++i) variance += covariance[i][i];
+  return std::isfinite(variance) && variance >= 0.0
+             ? fmt::format("{:.3g} {}", factor * std::sqrt(variance), unit)
+             : "-";
 }
 
 void forget_before(double time_s, std::deque<double>* times) {
@@ -89,7 +122,15 @@ const char* can_state_name(int state) {
   return state >= 0 && state < static_cast<int>(names.size()) ? names[static_cast<std::size_t>(state)] : "?";
 }
 
+const char* bus_text(const status_t& status) {
+  const bool in_use = status.can_state != status_t::CAN_UNKNOWN || status.can_send_errors > 0 ||
+                      status.can_bus_offs > 0 || status.can_received > 0;
+  return in_use ? can_state_name(status.can_state) : "off";
+}
+
 void Board::take(const odometry_t& message, double now_s) {
+  if (!first_s_) first_s_ = now_s;
+  if (message.valid != 0) last_valid_s_ = now_s;
   odometry_ = message;
   odometry_s_ = now_s;
   odometry_times_s_.push_back(now_s);
@@ -97,6 +138,11 @@ void Board::take(const odometry_t& message, double now_s) {
 }
 
 void Board::take(const status_t& message, double now_s) {
+  if (!first_s_) first_s_ = now_s;
+  // A restarted daemon counts anew.
+  if (!images_.empty() && message.frames_received < images_.back().received) images_.clear();
+  images_.push_back({now_s, message.frames_received});
+  while (images_.front().arrived_s < now_s - kWindow_s) images_.pop_front();
   status_ = message;
   status_s_ = now_s;
   status_times_s_.push_back(now_s);
@@ -104,14 +150,16 @@ void Board::take(const status_t& message, double now_s) {
 }
 
 void Board::take(const timing_t& message, double now_s) {
+  if (timing_ && message.process_cpu_s < timing_->process_cpu_s) timings_.clear();
   timing_ = message;
-  timings_.push_back({now_s, message.latency_ms, message.wall_ms[timing_t::STAGE_TRACKING]});
+  timings_.push_back(
+      {now_s, message.latency_ms, message.wall_ms[timing_t::STAGE_TRACKING], message.process_cpu_s});
   while (timings_.front().arrived_s < now_s - kWindow_s) timings_.pop_front();
 }
 
 std::string Board::render(double now_s, bool colour) const {
   std::string text = state_lines(now_s, colour);
-  if (status_) text += pose_lines() + time_lines(now_s) + count_lines();
+  if (status_) text += pose_lines() + time_lines(now_s) + count_lines() + fault_lines() + process_lines();
   if (undecodable_ > 0) text += fmt::format("{} messages of another version of the types\n", undecodable_);
   return text;
 }
@@ -128,19 +176,46 @@ std::string Board::state_lines(double now_s, bool colour) const {
   line += s.quality >= 0 ? fmt::format("   quality {}", s.quality) : "   quality -";
   line += fmt::format("   scale {}   map {}   resets {}   lost {} times\n", scale_text(s.scale_state),
                       s.map_id, s.reset_counter, s.times_lost);
-  if (!s.message.empty()) line += s.message.substr(0, 98) + "\n";
-  return line + "\n";
+  const std::string why = reason(now_s);
+  if (!why.empty()) line += "reason    " + why.substr(0, 88) + "\n";
+  return line + "valid     " + last_valid_text(now_s) + "\n\n";
+}
+
+std::string Board::reason(double now_s) const {
+  if (!status_->message.empty()) return status_->message;
+  const std::string by_state = reason_of(status_->state);
+  if (!by_state.empty()) return by_state;
+  if (!odometry_) return "no odometry received";
+  const double age_s = now_s - odometry_s_;
+  return age_s > kInTime_s ? fmt::format("no pose in time: the last odometry came {:.1f} s ago", age_s) : "";
+}
+
+std::string Board::last_valid_text(double now_s) const {
+  if (last_valid_s_) return fmt::format("last valid pose {:.1f} s ago", now_s - *last_valid_s_);
+  return fmt::format("no valid pose since top began to listen, {:.0f} s ago",
+                     now_s - first_s_.value_or(now_s));
 }
 
 std::string Board::pose_lines() const {
-  if (!odometry_ || !odometry_->valid) return "odom      no valid pose\n";
+  if (!odometry_ || !odometry_->valid) return "odom      no valid pose\n" + sigma_line();
   const odometry_t& o = *odometry_;
   const double w = o.orientation[0], x = o.orientation[1], y = o.orientation[2], z = o.orientation[3];
   const double heading = kDegrees_per_rad * std::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
   const char* unit = o.scale_state == status_t::SCALE_UNKNOWN ? "units" : "m";
   return fmt::format("odom      x {:.2f}  y {:.2f}  z {:.2f} {}   heading {:.1f} deg   speed {:.2f} {}/s\n",
                      o.position[0], o.position[1], o.position[2], unit, heading,
-                     std::hypot(o.velocity[0], o.velocity[1], o.velocity[2]), unit);
+                     std::hypot(o.velocity[0], o.velocity[1], o.velocity[2]), unit) +
+         sigma_line();
+}
+
+std::string Board::sigma_line() const {
+  if (!odometry_ || !odometry_->valid) return "sigma     position -   attitude -   velocity -\n";
+  const odometry_t& o = *odometry_;
+  const std::string unit = o.scale_state == status_t::SCALE_UNKNOWN ? "units" : "m", speed = unit + "/s";
+  return fmt::format("sigma     position {}   attitude {}   velocity {}\n",
+                     sigmas(o.pose_covariance, 0, 1.0, unit.c_str()),
+                     sigmas(o.pose_covariance, 3, kDegrees_per_rad, "deg"),
+                     sigmas(o.twist_covariance, 0, 1.0, speed.c_str()));
 }
 
 std::string Board::time_lines(double now_s) const {
@@ -149,11 +224,25 @@ std::string Board::time_lines(double now_s) const {
     latency_ms.push_back(t.latency_ms);
     tracking_ms.push_back(t.tracking_ms);
   }
-  std::string text =
-      fmt::format("rates     odometry {:.1f} Hz   status {:.1f} Hz\n",
-                  rate_hz(odometry_times_s_, now_s, kWindow_s), rate_hz(status_times_s_, now_s, kWindow_s));
+  std::string text = fmt::format("rates     odometry {:.1f} Hz   status {:.1f} Hz   images {:.1f} Hz\n",
+                                 rate_hz(odometry_times_s_, now_s, kWindow_s),
+                                 rate_hz(status_times_s_, now_s, kWindow_s), images_hz());
   text += "latency   " + spread(std::move(latency_ms)) + "   (mid-exposure to output)\n";
   return text + "tracking  " + spread(std::move(tracking_ms)) + "\n";
+}
+
+double Board::images_hz() const {
+  if (images_.size() < 2) return 0.0;
+  const double passed_s = images_.back().arrived_s - images_.front().arrived_s;
+  const auto count = static_cast<double>(images_.back().received - images_.front().received);
+  return passed_s > 0.0 ? count / passed_s : 0.0;
+}
+
+double Board::cpu_percent() const {
+  if (timings_.size() < 2) return NAN;
+  const double passed_s = timings_.back().arrived_s - timings_.front().arrived_s;
+  const double used_s = timings_.back().process_cpu_s - timings_.front().process_cpu_s;
+  return passed_s > 0.0 ? 100.0 * used_s / passed_s : NAN;
 }
 
 std::string Board::count_lines() const {
@@ -174,17 +263,34 @@ std::string Board::count_lines() const {
   }
   text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
                       s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
-  text += fmt::format("map       {} keyframes   {} landmarks   {} virtual points\n", s.keyframes, s.landmarks,
-                      s.vmps);
-  text += fmt::format("CAN       {}   {} not sent   {} bus-offs   {} received\n", can_state_name(s.can_state),
-                      s.can_send_errors, s.can_bus_offs, s.can_received);
+  const MapCounts map = map_counts(s);
+  return text +
+         fmt::format("map       {} keyframes   {} points   {} virtual points   (points have a depth)\n",
+                     map.keyframes, map.points, map.vmps);
+}
+
+std::string Board::fault_lines() const {
+  const status_t& s = *status_;
+  const std::string bus = bus_text(s);
+  std::string text = "CAN       " + bus;
+  if (bus != "off")
+    text += fmt::format("   {} not sent   {} bus-offs   {} received", s.can_send_errors, s.can_bus_offs,
+                        s.can_received);
   text += fmt::format(
-      "errors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
+      "\nerrors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
       s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);
   if (s.side_missing != 0)
     text += fmt::format("missing   {}   {} attempts failed\n", missing_functions(s.side_missing),
                         s.side_failures);
+  return text;
+}
+
+std::string Board::process_lines() const {
+  const status_t& s = *status_;
+  std::string text;
   if (timing_) {
+    const double cpu = cpu_percent();
+    text += std::isfinite(cpu) ? fmt::format("CPU       {:.0f} % of one core\n", cpu) : "CPU       -\n";
     text += fmt::format("memory    {:.0f} MB now, {:.0f} MB most, {:.0f} MB of it pools\n",
                         static_cast<double>(timing_->resident_bytes) / kMegabyte,
                         static_cast<double>(timing_->peak_resident_bytes) / kMegabyte,
