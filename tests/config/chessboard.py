@@ -54,9 +54,10 @@ def write_pictures(lens, folder, count=20, seed=3):
     """Numbered PNG files of the board at many places and tilts; those near the edges keep the whole board in the picture."""
     folder.mkdir(parents=True, exist_ok=True)
     source, directions = np.random.default_rng(seed), rays(lens)
+    half_width, half_height = (side / 2 / lens["matrix"][0, 0] for side in lens["size"])
     for number in range(count):
-        distance = source.uniform(11, 15) * lens["matrix"][0, 0] / 520
+        distance = source.uniform(13, 16) * lens["matrix"][0, 0] / 520
         side = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0)][number % 5]
-        place = [side[0] * 0.24 * distance, side[1] * 0.16 * distance, distance]
+        place = [side[0] * 0.4 * half_width * distance, side[1] * 0.35 * half_height * distance, distance]
         turn = source.uniform(-0.45, 0.45, 3) * [1, 1, 0.5]
         cv2.imwrite(str(folder / f"{number:04d}.png"), picture(lens, directions, turn, place))
