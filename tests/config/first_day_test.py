@@ -201,7 +201,7 @@ def check_car(reader):
     where = reader.vehicles / "car"
     expect("FARPOINT_STATUS" in (where / "odometry.dbc").read_text(), "odometry.dbc describes no frame")
     expect(poses_of(where / "out.candump") > 1000, "few frames for the bus")
-    live = pictures_of(where / "again.lcm")
+    live = pictures_of(where / "again-000001.lcm")
     expect(10 <= len(live) <= 90, f"{len(live)} pictures were recorded in eight seconds at {RATE_HZ} Hz")
     expect_report(where / "report.html")
 
