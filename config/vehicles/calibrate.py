@@ -46,9 +46,10 @@ def read_pictures(pictures, corners):
         if points is not None:
             names.append(str(picture))
             seen.append(points)
-    print(f"{len(seen)} of {len(pictures)} pictures show the board of {corners[0]}x{corners[1]} inner corners")
+    shown = f"{len(seen)} of {len(pictures)} pictures show the board of {corners[0]}x{corners[1]} inner corners"
     if len(seen) < LEAST_PICTURES:
-        raise Unusable(f"expected {LEAST_PICTURES} or more pictures with the whole board; is --corners right?")
+        raise Unusable(f"{shown}, expected {LEAST_PICTURES} or more; is --corners right?")
+    print(shown)
     return size, names, seen
 
 

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of a chessboard as a camera of known lens sees it."""
 
+import functools
+
 import cv2
 import numpy as np
 
 SQUARES = (10, 7)  # 9x6 inner corners
-PIXELS_A_SQUARE = 48
+PIXELS_A_SQUARE = 36
 MARGIN = 1  # white squares around the board
 
-PINHOLE = {"size": (640, 480), "matrix": np.array([[520.0, 0, 325], [0, 518, 236], [0, 0, 1]]),
+PINHOLE = {"size": (480, 360), "matrix": np.array([[390.0, 0, 244], [0, 388, 177], [0, 0, 1]]),
            "distortion": np.array([-0.24, 0.07, 0.0006, -0.0004, 0.0]), "fisheye": False}
-FISHEYE = {"size": (640, 480), "matrix": np.array([[290.0, 0, 322], [0, 291, 242], [0, 0, 1]]),
+FISHEYE = {"size": (480, 360), "matrix": np.array([[218.0, 0, 241], [0, 219, 182], [0, 0, 1]]),
            "distortion": np.array([-0.02, 0.006, -0.004, 0.0007]), "fisheye": True}
 
 
+@functools.cache
 def texture():
     columns, rows = (SQUARES[0] + 2 * MARGIN, SQUARES[1] + 2 * MARGIN)
     y, x = np.mgrid[0:rows, 0:columns]
@@ -30,7 +33,7 @@ def rays(lens):
     if lens["fisheye"]:
         found = cv2.fisheye.undistortPoints(points, lens["matrix"], lens["distortion"])
     else:
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-9)
         found = cv2.undistortPointsIter(points, lens["matrix"], lens["distortion"], None, None, criteria)
     return np.concatenate([found.reshape(-1, 2), np.ones((found.shape[0], 1))], axis=1)
 
@@ -50,13 +53,13 @@ def picture(lens, directions, turn_rad, place):
                      borderMode=cv2.BORDER_CONSTANT, borderValue=120)
 
 
-def write_pictures(lens, folder, count=20, seed=3):
+def write_pictures(lens, folder, count=15, seed=3):
     """Numbered PNG files of the board at many places and tilts; those near the edges keep the whole board in the picture."""
     folder.mkdir(parents=True, exist_ok=True)
     source, directions = np.random.default_rng(seed), rays(lens)
     half_width, half_height = (side / 2 / lens["matrix"][0, 0] for side in lens["size"])
     for number in range(count):
-        distance = source.uniform(13, 16) * lens["matrix"][0, 0] / 520
+        distance = source.uniform(13, 16) * lens["matrix"][0, 0] / (0.8125 * lens["size"][0])
         side = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0)][number % 5]
         place = [side[0] * 0.4 * half_width * distance, side[1] * 0.35 * half_height * distance, distance]
         turn = source.uniform(-0.45, 0.45, 3) * [1, 1, 0.5]

@@ -29,7 +29,7 @@ def kitti_lens(recording, size):
     """Focal lengths and centre of a rectified recording, from its calib.txt."""
     line = next(line for line in (recording / "calib.txt").read_text().splitlines() if line.startswith("P0:"))
     p = [float(word) for word in line.split()[1:]]
-    return {"size": size, "fx": p[0], "fy": p[5], "cx": p[2], "cy": p[6], "d": [0.0] * 5}
+    return {"size": size, "fx": p[0], "fy": p[5], "cx": p[2], "cy": p[6], "d": [0.0] * 5, "rate_hz": 10}
 
 
 def euroc_lens(recording):
@@ -40,13 +40,14 @@ def euroc_lens(recording):
 
     width, height = map(int, numbers("resolution"))
     fx, fy, cx, cy = numbers("intrinsics")
-    return {"size": (width, height), "fx": fx, "fy": fy, "cx": cx, "cy": cy, "d": [*numbers("distortion_coefficients"), 0.0]}
+    return {"size": (width, height), "fx": fx, "fy": fy, "cx": cx, "cy": cy, "d": [*numbers("distortion_coefficients"), 0.0],
+            "rate_hz": 20}
 
 
 def replace_lens(camera_file, lens):
     """An example's camera file with another camera's numbers, as its head asks for."""
     new = {"width_px": lens["size"][0], "height_px": lens["size"][1], "fx_px": lens["fx"], "fy_px": lens["fy"],
-           "cx_px": lens["cx"], "cy_px": lens["cy"], "distortion": lens["d"]}
+           "cx_px": lens["cx"], "cy_px": lens["cy"], "distortion": lens["d"], "rate_hz": lens["rate_hz"]}
     lines = camera_file.read_text().splitlines()
     for number, line in enumerate(lines):
         key = line.split(":")[0]

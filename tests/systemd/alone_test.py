@@ -40,18 +40,16 @@ def check_installed(machine):
 
 def check_use(machine):
     """From nothing to a report, in a folder of its own."""
-    said = machine.do("farpoint", "simulate", "town", "-o", "town.lcm", "--duration", "12", "--size", "620x188")
-    expect("120 frames" in said, "simulate: " + said)
+    said = machine.do("farpoint", "simulate", "town", "-o", "town.lcm", "--duration", "8", "--size", "620x188")
+    expect("80 frames" in said, "simulate: " + said)
     machine.do("farpointd", "--replay", "town.lcm", "--lockstep", "--output", "out.lcm", "--trajectory", "path.tum")
     poses = len(machine.path("/tmp/path.tum").read_text().splitlines())
-    expect(poses >= 60, f"only {poses} of 120 frames have a pose")
-    expect("out" in machine.do("farpoint", "evaluate", "out.lcm", "--truth", "town.lcm"), "evaluate printed no row")
-    machine.do("farpoint", "report", "out.lcm", "--truth", "town.lcm", "-o", "report.html")
+    expect(poses >= 40, f"only {poses} of 80 frames have a pose")
+    machine.do("farpoint", "report", "out.lcm", "-o", "report.html")
     report = machine.path("/tmp/report.html").read_text()
     expect(report.rstrip().endswith("</html>") and "<svg" in report, "the report is no page with drawings")
     for vehicle in ("car", "rover", "drone"):
-        folder = f"/usr/share/farpoint/vehicles/{vehicle}"
-        machine.do("farpointd", "--config", folder + "/farpoint.yaml", "--replay", "town.lcm", "--lockstep")
+        machine.do("farpoint", "dbc", "--config", f"/usr/share/farpoint/vehicles/{vehicle}/farpoint.yaml", "-o", "bus.dbc")
 
 
 def put_files(machine):

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: bare_test.py BUILD_FOLDER CPACK [--spy]
+"""usage: bare_test.py BUILD_FOLDER CPACK [--spy] [--clone]
 
 The .deb on a bare Debian 12 (the packages that Debian marks as required, and apt): apt installs it with what it depends
 on, then the checks of alone_test.py, then the service under systemd in a container. With --spy also 'farpoint spy' with
-a jar by make_types_jar, on a virtual display. Needs root, the network and 'tools/deps --package'. Minutes; no ctest entry.
+a jar by make_types_jar, on a virtual display; with --clone, on another bare Debian, the commands of config/vehicles/README.md
+from a clone and a folder of pictures to the report. Needs root, the network and 'tools/deps --package'. Minutes; no ctest entry.
 The bare system is kept in ${XDG_CACHE_HOME:-~/.cache}/farpoint/bare for a month.
 """
 
@@ -17,6 +18,11 @@ import time
 import alone_test
 import package_support
 from package_support import Failed, Machine, need, run
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(SOURCE / "tests/config"))
+import first_day_test  # noqa: E402
+import stand_ins  # noqa: E402
 
 MONTH_S = 30 * 86400
 SOURCES = ("/etc/apt/sources.list.d/debian.sources", "/etc/apt/sources.list")
@@ -76,6 +82,12 @@ def bare_root():
     return root
 
 
+def bare_machine(name):
+    machine = Machine(bare_root(), name)
+    shutil.copyfile("/etc/resolv.conf", machine.path("/etc/resolv.conf"))
+    return machine
+
+
 def apt(machine, *words):
     return machine.do("apt-get", "-qy", "-o", "Acquire::Retries=3", "-o", "APT::Sandbox::User=root", *words)
 
@@ -92,6 +104,33 @@ def check_service(machine):
     alone_test.expect(status == 0 and said.rstrip().endswith("well"), f"service: status {status}: {said.strip()[-1500:]}")
 
 
+def put_pictures(folder):
+    """240 pictures and ROS' calibration: all that a reader brings."""
+    recording = (SOURCE.parent / "shared/data" / stand_ins.KITTI).resolve()
+    alone_test.expect(recording.is_dir(), f"no recording {recording}")
+    (folder / "drive").mkdir()
+    for picture in sorted((recording / "image_0").iterdir())[:first_day_test.PICTURES]:
+        shutil.copy(picture, folder / "drive")
+    (folder / "ost.yaml").write_text(stand_ins.ros_calibration(stand_ins.kitti_lens(recording, (1242, 375))))
+
+
+def check_clone():
+    """What the page says for a bare Debian, as it stands there; ccache of this machine makes it quicker."""
+    machine = bare_machine("clone")
+    apt(machine, "update")
+    clone = machine.path("/root/farpoint")
+    need(run("git", "clone", "--quiet", SOURCE, clone), "git clone")
+    put_pictures(clone)
+    if cache := os.environ.get("CCACHE_DIR"):
+        machine.path("/ccache").mkdir()
+        package_support.mount("--bind", cache, machine.path("/ccache"))
+    page = (SOURCE / "config/vehicles/README.md").read_text()
+    texts = [text for _, reason, text in first_day_test.blocks(page) if "tools/test" in (reason or "") or "path.tum" in text]
+    said = machine.do("env", "CCACHE_DIR=/ccache", "bash", "-euo", "pipefail", "-c", "cd /root/farpoint\n" + "\n".join(texts))
+    print("\n".join(said.splitlines()[-3:]))
+    first_day_test.expect_report(clone / "report.html")
+
+
 def check_spy(machine):
     install(machine, "default-jre", "default-jdk-headless", "liblcm-bin", "liblcm-java", "libjchart2d-java", "xvfb", "xauth",
             "x11-utils")
@@ -105,8 +144,9 @@ def main():
         package_support.skip(reason)
     package_support.enter_namespaces(with_network=True)
     try:
-        machine = Machine(bare_root())
-        shutil.copyfile("/etc/resolv.conf", machine.path("/etc/resolv.conf"))
+        if "--clone" in sys.argv[3:]:
+            check_clone()
+        machine = bare_machine("package")
         alone_test.bring_packages(machine, build, cpack)
         apt(machine, "update")
         install(machine, "/tmp/farpoint.deb")
@@ -115,7 +155,7 @@ def main():
         if "--spy" in sys.argv[3:]:
             check_spy(machine)
         check_service(machine)
-    except Failed as complaint:
+    except (Failed, first_day_test.Failed) as complaint:
         print(f"{pathlib.Path(sys.argv[0]).name}: {complaint}")
         sys.exit(1)
     print("bare_test.py: passed")

@@ -71,8 +71,8 @@ class Machine:
 
     KERNEL = (("proc", "proc"), ("tmpfs", "run"))
 
-    def __init__(self, lower, hidden=()):
-        self.folder = test_folder() / "machine"
+    def __init__(self, lower, name="machine", hidden=()):
+        self.folder = test_folder() / name
         self.folder.mkdir()
         self.root = self.folder / "root"
         mount("--make-rprivate", "/")
@@ -129,7 +129,7 @@ class Machine:
 def make_package(build, cpack, folder):
     """The .deb of a build."""
     build = pathlib.Path(build).resolve()
-    done = run(cpack, "-G", "DEB", "-B", folder, "--config", build / "CPackConfig.cmake", cwd=build)
+    done = run(cpack, "-G", "DEB", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none", "-B", folder, "--config", build / "CPackConfig.cmake", cwd=build)
     packages = list(pathlib.Path(folder).glob("*.deb"))
     if done.returncode != 0 or len(packages) != 1:
         raise Failed("cpack: " + (done.stderr or done.stdout).strip())
