@@ -62,5 +62,7 @@ def write_pictures(lens, folder, count=15, seed=3):
         distance = source.uniform(13, 16) * lens["matrix"][0, 0] / (0.8125 * lens["size"][0])
         side = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0)][number % 5]
         place = [side[0] * 0.4 * half_width * distance, side[1] * 0.35 * half_height * distance, distance]
-        turn = source.uniform(-0.45, 0.45, 3) * [1, 1, 0.5]
+        # Tilted, to all sides: a board that faces the camera tells focal length and distance apart badly.
+        tilt, direction = source.uniform(0.4, 0.65), 2.4 * number
+        turn = [tilt * np.cos(direction), tilt * np.sin(direction), source.uniform(-0.2, 0.2)]
         cv2.imwrite(str(folder / f"{number:04d}.png"), picture(lens, directions, turn, place))

@@ -119,6 +119,7 @@ def mcap_of(pictures, lens, rate_hz):
 
 
 def make_video(pattern, rate_hz, output):
-    """An mp4 of numbered pictures, without loss."""
-    subprocess.run(["ffmpeg", "-v", "error", "-y", "-framerate", str(rate_hz), "-i", pattern, "-c:v", "libx264", "-preset",
-                    "ultrafast", "-qp", "0", str(output)], check=True, stdin=subprocess.DEVNULL)
+    """An mp4 of numbered pictures, without loss and with all 256 grey levels."""
+    subprocess.run(["ffmpeg", "-v", "error", "-y", "-framerate", str(rate_hz), "-i", pattern, "-vf",
+                    "scale=in_range=full:out_range=full", "-pix_fmt", "yuvj444p", "-c:v", "libx264", "-preset", "ultrafast",
+                    "-qp", "0", str(output)], check=True, stdin=subprocess.DEVNULL)
