@@ -9,6 +9,7 @@ import numpy as np
 SQUARES = (10, 7)  # 9x6 inner corners
 PIXELS_A_SQUARE = 36
 MARGIN = 1  # white squares around the board
+FINER = 2  # a pixel is the mean of FINER x FINER rays
 
 PINHOLE = {"size": (480, 360), "matrix": np.array([[390.0, 0, 244], [0, 388, 177], [0, 0, 1]]),
            "distortion": np.array([-0.24, 0.07, 0.0006, -0.0004, 0.0]), "fisheye": False}
@@ -26,10 +27,10 @@ def texture():
 
 
 def rays(lens):
-    """Direction (x, y, 1) of each pixel, by rows."""
+    """Direction (x, y, 1) of each ray, by rows."""
     width, height = lens["size"]
-    y, x = np.mgrid[0:height, 0:width].astype(np.float64)
-    points = np.stack([x, y], axis=-1).reshape(-1, 1, 2)
+    y, x = np.mgrid[0:height * FINER, 0:width * FINER]
+    points = ((np.stack([x, y], axis=-1) + 0.5) / FINER - 0.5).reshape(-1, 1, 2)
     if lens["fisheye"]:
         found = cv2.fisheye.undistortPoints(points, lens["matrix"], lens["distortion"])
     else:
@@ -48,9 +49,10 @@ def picture(lens, directions, turn_rad, place):
     with np.errstate(divide="ignore", invalid="ignore"):
         board = board[:, :2] / board[:, 2:]
     width, height = lens["size"]
-    at = ((board + MARGIN) * PIXELS_A_SQUARE - 0.5).astype(np.float32).reshape(height, width, 2)
-    return cv2.remap(texture(), np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1]), cv2.INTER_LINEAR,
+    at = ((board + MARGIN) * PIXELS_A_SQUARE - 0.5).astype(np.float32).reshape(height * FINER, width * FINER, 2)
+    fine = cv2.remap(texture(), np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1]), cv2.INTER_LINEAR,
                      borderMode=cv2.BORDER_CONSTANT, borderValue=120)
+    return cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def write_pictures(lens, folder, count=15, seed=3):
