@@ -52,7 +52,7 @@ class Calibrating(unittest.TestCase):
         done = self.calibrate("--corners", "9x6")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.found()["model"], "pinhole-radtan")
-        self.expect_lens(chessboard.PINHOLE, 0.003)
+        self.expect_lens(chessboard.PINHOLE, 0.001)
         self.assertIn("15 of 15 pictures", done.stdout)
 
     def test_a_fisheye_is_found_again(self):
@@ -60,7 +60,7 @@ class Calibrating(unittest.TestCase):
         done = self.calibrate("--corners", "9x6", "--fisheye")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.found()["model"], "kannala-brandt")
-        self.expect_lens(chessboard.FISHEYE, 0.005)
+        self.expect_lens(chessboard.FISHEYE, 0.001)
 
     def expect_refusal(self, part, *arguments):
         done = self.calibrate(*arguments)

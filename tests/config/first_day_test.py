@@ -196,7 +196,7 @@ def check_calibration(reader):
     import chessboard
     lines = dict(line.split(": ", 1) for line in (reader.vehicles / "camera.yaml").read_text().splitlines())
     true = chessboard.PINHOLE["matrix"][0, 0]
-    expect(abs(float(lines["fx_px"]) / true - 1) < 0.005, f"focal length {lines['fx_px']}, expected {true}")
+    expect(abs(float(lines["fx_px"]) / true - 1) < 0.002, f"focal length {lines['fx_px']}, expected {true}")
     # Its file is one that the programs take.
     reader.run(reader.folder, "farpoint import images film --rate 10 --camera vehicles/camera.yaml -o film.lcm")
 
