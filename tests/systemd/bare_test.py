@@ -66,6 +66,10 @@ xwininfo -root -tree; cat /tmp/spy.err; exit 1
 """
 
 
+def step(text):
+    print(f"bare_test.py: {text}", flush=True)
+
+
 def bare_root():
     """A root file system with nothing except required packages and apt, made once a month."""
     cache = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "farpoint/bare"
@@ -74,7 +78,7 @@ def bare_root():
         return root
     shutil.rmtree(cache, ignore_errors=True)
     cache.mkdir(parents=True)
-    print("bare_test.py: making a bare Debian, some minutes", flush=True)
+    step("making a bare Debian, some minutes")
     sources = [path for path in SOURCES if pathlib.Path(path).is_file() and "bookworm" in pathlib.Path(path).read_text()]
     need(run("mmdebstrap", "--quiet", "--variant=apt", "bookworm", cache / "building", *sources[:1]), "mmdebstrap")
     (cache / "building").rename(root)
@@ -97,6 +101,7 @@ def install(machine, *packages):
 
 
 def check_service(machine):
+    step("the service under systemd, in a container")
     machine.do("cp", "/tmp/town.lcm", "/var/lib/farpoint/town.lcm")
     machine.put(alone_test.CONFIGURATION, CONFIGURATION)
     install(machine, "systemd-sysv", "procps")
@@ -116,6 +121,7 @@ def put_pictures(folder):
 
 def check_clone():
     """What the page says for a bare Debian, as it stands there; ccache of this machine makes it quicker."""
+    step("from a clone and a folder of pictures to the report")
     machine = bare_machine("clone")
     apt(machine, "update")
     clone = machine.path("/root/farpoint")
@@ -132,6 +138,7 @@ def check_clone():
 
 
 def check_spy(machine):
+    step("farpoint spy")
     install(machine, "default-jre", "default-jdk-headless", "liblcm-bin", "liblcm-java", "libjchart2d-java", "xvfb", "xauth",
             "x11-utils")
     machine.do("/usr/share/farpoint/make_types_jar", "/tmp/types.jar")
@@ -146,6 +153,7 @@ def main():
     try:
         if "--clone" in sys.argv[3:]:
             check_clone()
+        step("the package, by apt")
         machine = bare_machine("package")
         alone_test.bring_packages(machine, build, cpack)
         apt(machine, "update")
@@ -158,7 +166,7 @@ def main():
     except (Failed, first_day_test.Failed) as complaint:
         print(f"{pathlib.Path(sys.argv[0]).name}: {complaint}")
         sys.exit(1)
-    print("bare_test.py: passed")
+    step("passed")
 
 
 if __name__ == "__main__":
