@@ -95,15 +95,16 @@ def check_figures(page, results):
 class Reader:
     """A folder with the examples, the programs on the path, and what the commands printed."""
 
-    def __init__(self, source, build, folder):
+    def __init__(self, source, build, folder, until):
         self.source, self.folder, self.said = source, folder, ""
         self.recordings = (source.parent / "shared/data").resolve()
         self.vehicles = folder / "vehicles"
         shutil.copytree(source / "config/vehicles", self.vehicles)
         (folder / "bin").mkdir()
         (folder / "bin/python3").symlink_to("/usr/bin/python3")
+        (folder / "bin/timeout").symlink_to(source / "tests/config/patient_timeout.py")
         path = f"{folder}/bin:{build}/bin:{os.environ['PATH']}"
-        self.environment = {**os.environ, "PATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+        self.environment = {**os.environ, "PATH": path, "PYTHONDONTWRITEBYTECODE": "1", "FARPOINT_UNTIL": until}
         alone = ["unshare", "--map-root-user", "--net"]  # nothing leaves, and tests run side by side
         self.prefix = alone if subprocess.run([*alone, "true"], capture_output=True, check=False).returncode == 0 else []
 
@@ -213,7 +214,7 @@ def check_car(reader):
     expect("FARPOINT_STATUS" in (where / "odometry.dbc").read_text(), "odometry.dbc describes no frame")
     expect(poses_of(where / "out.candump") > 1000, "few frames for the bus")
     live = pictures_of(where / "again-000001.lcm")
-    expect(10 <= len(live) <= 90, f"{len(live)} pictures were recorded in eight seconds at {RATE_HZ} Hz")
+    expect(len(live) >= 10, f"{len(live)} pictures were recorded in eight seconds at {RATE_HZ} Hz")
     expect_report(where / "report.html")
 
 
@@ -258,13 +259,15 @@ SCENARIOS = {"recording": (prepare_recording, check_recording), "bench": (prepar
              "calibration": (prepare_calibration, check_calibration), "car": (prepare_car, check_car),
              "rover": (prepare_rover, check_rover), "drone": (prepare_drone, check_drone),
              "simulation": (prepare_simulation, check_simulation)}
+# What the live runs of a scenario print before their seconds count.
+UNTIL = {"car": "streams ", "rover": "-> no_camera"}
 WITHOUT_RECORDINGS = ("calibration", "simulation")
 
 
 def check_scenario(name, page, source, build):
     prepare, check = SCENARIOS[name]
     with tempfile.TemporaryDirectory() as folder:
-        reader = Reader(source, build, pathlib.Path(folder))
+        reader = Reader(source, build, pathlib.Path(folder), UNTIL.get(name, "live from"))
         where = prepare(reader)
         for scenario, _, block in blocks(page):
             if scenario == name:
