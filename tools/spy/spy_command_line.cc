@@ -59,7 +59,8 @@ std::vector<std::string> spy_command_line(const SpyParts& parts, const std::stri
   require(parts.java, "java", "a Java runtime (tools/deps --spy; Debian: default-jre)");
   require(
       parts.types_jar, "farpoint_types.jar",
-      "a build made where javac and LCM's Java library were (tools/deps --spy, then build), or --jar FILE");
+      "a build made where javac and LCM's Java library were (tools/deps --spy, then build), or --jar FILE "
+      "(/usr/share/farpoint/make_types_jar of the package makes one)");
   require(parts.lcm_jar, "lcm.jar", "LCM's Java library (tools/deps --spy; Debian: liblcm-java)");
   require(parts.jchart2d_jar, "jchart2d.jar",
           "the charts it draws (tools/deps --spy; Debian: libjchart2d-java)");

@@ -196,4 +196,5 @@ def main():
         file.write(b"#ROSBAG V2.0\n" + bag_header + body + end)
 
 
-main()
+if __name__ == "__main__":
+    main()
