@@ -60,7 +60,8 @@ McapFile::Record McapFile::record_at(const BagPlace& place, std::uint64_t end) {
   record.place = place;
   record.kind = static_cast<std::uint8_t>(head[0]);
   record.data = {place.part, place.offset + kRecordHeadBytes};
-  record.data_bytes = little_endian(std::string_view(head).substr(1));
+  const std::string_view behind_kind{head.data() + 1, head.size() - 1};
+  record.data_bytes = little_endian(behind_kind);
   const std::uint64_t left = end - record.data.offset;
   if (record.data_bytes > left)
     fail(place, "a record of " + std::to_string(record.data_bytes) + " bytes, where " + std::to_string(left) +
