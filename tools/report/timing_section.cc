@@ -131,7 +131,7 @@ std::vector<Eigen::Vector2d> means_of_a_second(const std::vector<Eigen::Vector2d
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
     for (; end < points.size() && points[end].x() < points[begin].x() + 1.0; ++end) sum += points[end];
     if (end == begin) break;  // not a time
-    means.push_back(sum / static_cast<double>(end - begin));
+    means.emplace_back(sum / static_cast<double>(end - begin));
     begin = end;
   }
   return means;
@@ -221,8 +221,9 @@ std::string stage_bars(const Runs& runs) {
     svg.text({at(deadline) - 4, kTop_px + 10}, "deadline", Anchor::kEnd);
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const Eigen::Vector2d corner(kLeft_px + 230.0 * static_cast<double>(i % 4),
-                                 bottom + 42.0 + 17.0 * static_cast<double>(i / 4));
+    const std::size_t row = i / 4, column = i % 4;
+    const Eigen::Vector2d corner(kLeft_px + 230.0 * static_cast<double>(column),
+                                 bottom + 42.0 + 17.0 * static_cast<double>(row));
     svg.rectangle(
         corner, {22, 8},
         "fill=\"" + run_style(i).colour + "\" fill-opacity=\"" + (i % 2 == 0 ? "0.95" : "0.55") + "\"");
