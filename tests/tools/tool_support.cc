@@ -67,6 +67,16 @@ std::string complaint_of(const std::function<void()>& action) {
   return "";
 }
 
+bool passes_or_says_one_line(const std::function<void()>& action) {
+  try {
+    action();
+    return true;
+  } catch (const std::exception& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return false;
+  }
+}
+
 void expect_all_in(const std::string& message, const std::vector<std::string>& parts) {
   for (const std::string& part : parts)
     EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;

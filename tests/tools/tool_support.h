@@ -37,6 +37,8 @@ void replace_in(const std::filesystem::path& file, const std::string& from, cons
 
 // The message of the InputError that `action` must throw: one line.
 [[nodiscard]] std::string complaint_of(const std::function<void()>& action);
+// Whether `action` goes through. Where it throws, the message must be one line.
+[[nodiscard]] bool passes_or_says_one_line(const std::function<void()>& action);
 void expect_all_in(const std::string& message, const std::vector<std::string>& parts);
 
 struct ProgramResult {

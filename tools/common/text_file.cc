@@ -13,25 +13,19 @@
 
 #include "ipc/output_file.h"
 #include "tools/common/errors.h"
+#include "tools/common/numbers.h"
 
 namespace farpoint::tools {
 namespace {
 
-// Beyond this a time in microseconds does not fit 53 bits any more; no clock of a data set gets there.
-constexpr double kMaxSeconds = 9e9;
-
-// Rounded to microseconds.
-std::int64_t microseconds_of(std::int64_t nanoseconds) {
-  return nanoseconds / 1000 + (nanoseconds % 1000 >= 500 ? 1 : 0);
-}
+constexpr double kMaxSeconds = static_cast<double>(kMaxUtime) / 1e6;
 
 // Microseconds of a stamp that is a date in nanoseconds: of 1973 on. As seconds it would be beyond any clock.
 std::optional<std::int64_t> date_in_nanoseconds(std::string_view text) {
   constexpr std::int64_t kFirst_ns = 100'000'000'000'000'000;
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < kFirst_ns) return {};
-  return microseconds_of(value);
+  const std::optional<std::int64_t> value = whole_number(text);
+  if (!value || *value < kFirst_ns) return {};
+  return microseconds_of(*value);
 }
 
 }  // namespace
@@ -48,7 +42,7 @@ FieldLine::FieldLine(const std::filesystem::path* file, int number, std::string 
 }
 
 std::string_view FieldLine::text(std::size_t i) const {
-  return std::string_view(text_).substr(fields_.at(i).first, fields_.at(i).second);
+  return std::string_view{text_}.substr(fields_.at(i).first, fields_.at(i).second);
 }
 
 void FieldLine::fail(const std::string& message) const {
@@ -73,13 +67,9 @@ double FieldLine::number_at(std::size_t i, std::string_view what) const {
 }
 
 std::int64_t FieldLine::integer_at(std::size_t i, std::string_view what) const {
-  const std::string_view field = text(i);
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size()) {
-    fail("expected an integer for " + std::string(what) + ", found '" + std::string(field) + "'");
-  }
-  return value;
+  const std::optional<std::int64_t> value = whole_number(text(i));
+  if (!value) fail("expected an integer for " + std::string(what) + ", found '" + std::string(text(i)) + "'");
+  return *value;
 }
 
 double FieldLine::seconds_at(std::size_t i, std::string_view what) const {

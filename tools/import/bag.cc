@@ -8,6 +8,7 @@
 
 #include "daemon/config/camera_file.h"
 #include "tools/common/errors.h"
+#include "tools/common/numbers.h"
 #include "tools/import/bag_file.h"
 #include "tools/import/ros_message.h"
 
@@ -113,7 +114,7 @@ constexpr EncodingName kEncodings[] = {
 };
 
 std::int64_t time_of(std::int64_t header_utime, const BagMessage& message) {
-  return header_utime != 0 ? header_utime : (message.received_ns + 500) / 1000;
+  return header_utime != 0 ? header_utime : microseconds_of(message.received_ns);
 }
 
 class Collector {

@@ -56,6 +56,13 @@ class BagFile {
   [[noreturn]] virtual void fail(const BagPlace& place, const std::string& message) const = 0;
 };
 
+// One record of a container.
+struct BagRecord {
+  BagPlace place, data;  // of the whole record, of its data
+  std::uint64_t data_bytes = 0;
+  [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
+};
+
 // A bag whose messages lie in the file or in compressed chunks of it. Two chunks are held in memory.
 class ChunkedBag : public BagFile {
  public:

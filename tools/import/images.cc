@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "tools/common/errors.h"
+#include "tools/common/numbers.h"
 #include "tools/common/text_file.h"
 #include "tools/evaluate/statistics.h"
 
@@ -19,7 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr double kMinRate_hz = 1e-3, kMaxRate_hz = 10'000.0;
 constexpr std::uintmax_t kMaxStampFileBytes = std::uintmax_t{64} << 20;
-constexpr std::int64_t kMaxUtime = 9'000'000'000'000'000;  // as of FieldLine's times
 // Units are a factor of 1000 apart, as are these limits, so exactly one unit fits an interval.
 constexpr double kLeastInterval_s = 2e-3, kMostInterval_s = 2.0;
 constexpr std::array kUnits = {StampUnit::kSeconds, StampUnit::kMilliseconds, StampUnit::kMicroseconds,
@@ -80,13 +80,6 @@ std::vector<fs::path> list_pictures(const fs::path& folder) {
   throw InputError(stamp.where + ": expected " + expected + ", found '" + stamp.text + "'");
 }
 
-std::optional<std::int64_t> integer_of(const std::string& text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return {};
-  return value;
-}
-
 double number_of(const Stamp& stamp) {
   double value = 0.0;
   const char* const last = stamp.text.data() + stamp.text.size();
@@ -101,8 +94,8 @@ std::int64_t utime_of(const Stamp& stamp, StampUnit unit) {
   const double value_us = number_of(stamp) * (1e6 * seconds_of(unit));
   if (!(value_us >= 0.0 && value_us <= static_cast<double>(kMaxUtime)))
     refuse_stamp(stamp, std::string("a stamp of 0 to 9e9 seconds (read as ") + to_string(unit) + ")");
-  const std::optional<std::int64_t> integer = integer_of(stamp.text);
-  if (unit == StampUnit::kNanoseconds && integer) return *integer / 1000 + (*integer % 1000 >= 500 ? 1 : 0);
+  const std::optional<std::int64_t> integer = whole_number(stamp.text);
+  if (unit == StampUnit::kNanoseconds && integer) return microseconds_of(*integer);
   return std::llround(value_us);
 }
 
@@ -122,7 +115,8 @@ void refuse_other_date(const std::vector<Stamp>& stamps, double interval, StampU
 StampUnit unit_of(const std::vector<Stamp>& stamps) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
-    const std::optional<std::int64_t> from = integer_of(stamps[i - 1].text), to = integer_of(stamps[i].text);
+    const std::optional<std::int64_t> from = whole_number(stamps[i - 1].text),
+                                      to = whole_number(stamps[i].text);
     // Doubles of nanoseconds since 1970 are 256 ns apart.
     intervals.push_back(from && to ? static_cast<double>(*to) - static_cast<double>(*from)
                                    : number_of(stamps[i]) - number_of(stamps[i - 1]));

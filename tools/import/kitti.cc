@@ -3,11 +3,11 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <charconv>
 #include <map>
 
 #include "daemon/config/yaml_file.h"
 #include "tools/common/errors.h"
+#include "tools/common/numbers.h"
 #include "tools/common/text_file.h"
 
 namespace farpoint::tools {
@@ -27,10 +27,8 @@ std::map<std::int64_t, fs::path> list_images(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") continue;
-    const std::string stem = entry.path().stem().string();
-    std::int64_t number = -1;
-    const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-    if (error != std::errc() || end != stem.data() + stem.size() || number < 0) {
+    const std::int64_t number = whole_number(entry.path().stem().string()).value_or(-1);
+    if (number < 0) {
       throw InputError(entry.path().string() + ": expected an image named by its number, like 000000" +
                        extension);
     }

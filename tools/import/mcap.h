@@ -22,11 +22,8 @@ class McapFile : public ChunkedBag {
  private:
   class Fields;
   class Walk;
-  struct Record {
+  struct Record : BagRecord {
     std::uint8_t kind = 0;
-    BagPlace place, data;
-    std::uint64_t data_bytes = 0;
-    [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
   };
   struct ChunkHead {
     std::string compression;              // empty: none

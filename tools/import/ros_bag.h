@@ -23,13 +23,9 @@ class RosBag : public ChunkedBag {
  private:
   class Walk;
   using Fields = std::map<std::string, std::string>;  // of a record's header
-  // One record. The header is parsed, the data stays where it is.
-  struct Record {
+  // The header is parsed, the data stays where it is.
+  struct Record : BagRecord {
     Fields header;
-    BagPlace place;  // of the record
-    BagPlace data;
-    std::uint64_t data_bytes = 0;
-    [[nodiscard]] std::uint64_t end() const { return data.offset + data_bytes; }
   };
 
   // The record at `place`, which ends before byte `end` of its part.

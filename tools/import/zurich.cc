@@ -3,20 +3,18 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <map>
 #include <span>
 #include <utility>
 
 #include "tools/common/errors.h"
+#include "tools/common/numbers.h"
 #include "tools/common/text_file.h"
 
 namespace farpoint::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::int64_t kMaxUtime = 9'000'000'000'000'000;  // as of FieldLine's times
 
 // The lines of a log behind its heading, whose names are not read: the published order of columns counts.
 class LogFile {
@@ -58,11 +56,7 @@ std::map<std::int64_t, std::int64_t> read_image_times(const fs::path& file) {
 
 // Number of 00123.jpg; negative for other names.
 std::int64_t number_of(const fs::path& file) {
-  const std::string stem = file.stem().string();
-  std::int64_t number = -1;
-  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-  const bool whole = error == std::errc() && end == stem.data() + stem.size();
-  return whole && file.extension() == ".jpg" ? number : -1;
+  return file.extension() == ".jpg" ? whole_number(file.stem().string()).value_or(-1) : -1;
 }
 
 void read_images(const fs::path& folder, const fs::path& log, Recording* recording) {

@@ -83,44 +83,45 @@ std::vector<Eigen::Vector2d> tracking_points(const RunRecord& run) {
   return points;
 }
 
-std::string tracking_histogram(const Runs& runs) {
-  double high = 0.0;
+// Steps a run over one axis of times, nearly to the longest one. `label`: of a run with its times.
+template <typename Times, typename Label>
+std::string time_histogram(const Runs& runs, const char* title, const char* axis, Times&& times_of,
+                           Label&& label) {
+  std::vector<std::vector<double>> times;
+  double high_ms = 0.0;
   for (const RunRecord& run : runs) {
-    const std::vector<double> ms = times_ms(run, timing_t::STAGE_TRACKING);
-    if (!ms.empty()) high = std::max(high, percentile(ms, 99.8));
+    times.push_back(times_of(run));
+    if (!times.back().empty()) high_ms = std::max(high_ms, percentile(times.back(), 99.8));
   }
-  if (high <= 0.0) return {};
-  const std::vector<double> bins = edges(0.0, 1.05 * high, 60);
-  Plot plot({"Tracking, CPU time a frame", {"CPU time, ms"}, {"frames, %"}, false, 520, 320});
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const std::vector<double> ms = times_ms(runs[i], timing_t::STAGE_TRACKING);
-    if (!ms.empty()) plot.steps(runs[i].name, bins, shares_percent(ms, bins), run_style(i));
-  }
-  mark_deadline(runs, high, &plot);
+  if (high_ms <= 0.0) return {};
+  const std::vector<double> bins = edges(0.0, 1.05 * high_ms, 60);
+  Plot plot({title, {axis}, {"frames, %"}, false, 520, 320});
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    if (!times[i].empty())
+      plot.steps(label(runs[i], times[i]), bins, shares_percent(times[i], bins), run_style(i));
+  mark_deadline(runs, high_ms, &plot);
   return plot.svg();
 }
 
+std::string tracking_histogram(const Runs& runs) {
+  return time_histogram(
+      runs, "Tracking, CPU time a frame", "CPU time, ms",
+      [](const RunRecord& run) { return times_ms(run, timing_t::STAGE_TRACKING); },
+      [](const RunRecord& run, const std::vector<double>& /*ms*/) { return run.name; });
+}
+
 std::string latency_histogram(const Runs& runs) {
-  double high = 0.0;
-  std::vector<std::vector<double>> latencies_ms;
-  for (const RunRecord& run : runs) {
-    latencies_ms.emplace_back();
-    for (const timing_t& t : run.timings) {
-      if (t.latency_ms >= 0.0) latencies_ms.back().push_back(t.latency_ms);
-    }
-    if (!latencies_ms.back().empty()) high = std::max(high, percentile(latencies_ms.back(), 99.8));
-  }
-  if (high <= 0.0) return {};
-  const std::vector<double> bins = edges(0.0, 1.05 * high, 60);
-  Plot plot({"Latency, mid-exposure to output", {"latency, ms"}, {"frames, %"}, false, 520, 320});
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (latencies_ms[i].empty()) continue;
-    const double most = *std::max_element(latencies_ms[i].begin(), latencies_ms[i].end());
-    plot.steps(runs[i].name + ", most " + number(most, 1) + " ms", bins,
-               shares_percent(latencies_ms[i], bins), run_style(i));
-  }
-  mark_deadline(runs, high, &plot);
-  return plot.svg();
+  const auto latencies_ms = [](const RunRecord& run) {
+    std::vector<double> latencies;
+    for (const timing_t& t : run.timings)
+      if (t.latency_ms >= 0.0) latencies.push_back(t.latency_ms);
+    return latencies;
+  };
+  return time_histogram(runs, "Latency, mid-exposure to output", "latency, ms", latencies_ms,
+                        [](const RunRecord& run, const std::vector<double>& ms) {
+                          const double most = *std::max_element(ms.begin(), ms.end());
+                          return run.name + ", most " + number(most, 1) + " ms";
+                        });
 }
 
 // Means of about a second, so that frames with a keyframe and those without do not make a band.
@@ -241,8 +242,7 @@ std::string timing_section(const Runs& runs) {
       "Timing",
       "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed to the "
       "output; mapping works beside it in a threaded run, whose messages have no time of mapping or its "
-      "stages: "
-      "'mapping and rest' is the CPU time of the process without decoding, tracking and output.",
+      "stages: 'mapping and rest' is the CPU time of the process without decoding, tracking and output.",
       row_of({histogram, tracking_over_time(runs), latency_histogram(runs), load_over_time(runs), bars}));
 }
 

@@ -49,12 +49,8 @@ class ImportBag : public testing::Test {
       for (int i = 0; i < 3; ++i)
         damaged[(*random)() % (round % 2 == 0 ? 4000 : damaged.size())] = static_cast<char>((*random)());
       put(bag(), damaged);
-      try {
-        write_recording(read_bag(bag(), choice), root_ / "run.lcm");
+      if (passes_or_says_one_line([&] { write_recording(read_bag(bag(), choice), root_ / "run.lcm"); }))
         ++read;
-      } catch (const std::exception& error) {
-        EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-      }
     }
     return read;
   }

@@ -120,12 +120,7 @@ TEST_F(ImportMcap, DamagedBytesNeverCrash) {
       for (int i = 0; i < 3; ++i)
         damaged[random() % (round % 2 == 0 ? 3000 : damaged.size())] = static_cast<char>(random());
       put(file(), damaged);
-      try {
-        write_recording(read_bag(file(), {}), root_ / "run.lcm");
-        ++read;
-      } catch (const std::exception& error) {
-        EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-      }
+      if (passes_or_says_one_line([&] { write_recording(read_bag(file(), {}), root_ / "run.lcm"); })) ++read;
     }
   }
   EXPECT_GT(read, 20);

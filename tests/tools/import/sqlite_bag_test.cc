@@ -163,12 +163,7 @@ TEST_F(ImportDb3, DamagedBytesNeverCrash) {
     for (int i = 0; i < 5; ++i) damaged[16 + random() % (reach - 16)] = static_cast<char>(random());
     if (round % 4 == 0) damaged.resize(random() % damaged.size());
     put(file(), damaged);
-    try {
-      write_recording(read_bag(file(), {}), root_ / "run.lcm");
-      ++read;
-    } catch (const std::exception& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    }
+    if (passes_or_says_one_line([&] { write_recording(read_bag(file(), {}), root_ / "run.lcm"); })) ++read;
   }
   EXPECT_GT(read, 20);
 }
