@@ -140,7 +140,7 @@ class Collector {
       if (topics_.images[camera].is(connection)) take_image(message, connection, static_cast<int>(camera));
       if (topics_.infos[camera].is(connection)) take_info(message, connection, &infos_[camera]);
     }
-    // Odometry may be both.
+    // One topic of odometry may give wheels and truth.
     if (topics_.imu.is(connection)) take_imu(message, connection);
     if (topics_.wheels.is(connection)) take_wheels(message, connection);
     if (topics_.truth.is(connection)) take_truth(message, connection);
@@ -238,7 +238,7 @@ class Collector {
 
   const ChosenTopics& topics_;
   Recording* recording_;
-  BagFile* bag_ = nullptr;  // at hand
+  BagFile* bag_ = nullptr;  // being read
   std::map<std::uint32_t, BagConnection> connections_;
   std::vector<std::optional<RosCameraInfo>> infos_;
   std::uint64_t damaged_ = 0;

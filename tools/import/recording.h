@@ -113,8 +113,8 @@ void complete_cameras(const std::filesystem::path& calibration, Recording* recor
 // Whether a sensor's file that is damaged stops an import; images and their calibration always do.
 enum class Damaged : std::uint8_t { kLeftOut, kRefused };
 
-// Calls `read`, which reads a sensor's files into `samples`. Where it refuses them the recording goes on
-// without it, and a notice has the reason; with kRefused its InputError is thrown.
+// Calls `read`, which reads a sensor's files into `samples`. Where `read` throws InputError, kLeftOut empties
+// `samples` and notes the reason in the recording's notices; kRefused throws it on.
 template <typename Sample>
 void read_sensor(Damaged damaged, const std::function<void()>& read, std::vector<Sample>* samples,
                  Recording* recording) {

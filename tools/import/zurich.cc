@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The lines of a log behind its heading, whose names are not read: the published order of columns counts.
+// The lines of a log after its heading. Columns are taken in the published order, whatever the heading says.
 class LogFile {
  public:
   explicit LogFile(const fs::path& file) : text_(file, kCommaAndBlanks) {}
