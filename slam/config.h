@@ -88,6 +88,12 @@ struct CalibrationConfig {
   int min_keyframes = 8;            // free poses a window must have
 };
 
+// How fast the frame `odom` follows the map's corrections.
+struct OdometryConfig {
+  double correction_share = 0.02;        // of the way driven
+  double correction_rad_per_s = 0.0175;  // turn, while the vehicle moves: one degree a second
+};
+
 struct EstimatorConfig {
   PyramidOptions pyramid;
   ExtractorOptions extractor;
@@ -98,6 +104,7 @@ struct EstimatorConfig {
   LandmarkConfig landmarks;
   MappingConfig mapping;
   CalibrationConfig calibration;
+  OdometryConfig odometry;
 };
 
 }  // namespace farpoint::slam

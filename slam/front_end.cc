@@ -22,6 +22,7 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       initialiser_(config, rig),
       tracker_(config),
       port_(config.mapping, rings),
+      odometry_(config.odometry),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept) {
   waiting_.reserve(2 * Initialiser::kHistoryFrames);
@@ -117,6 +118,7 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
   settled_ = tracker_.view()->settled;
+  if (settled_) odometry_.follow_map();
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
 }
@@ -331,7 +333,7 @@ void FrontEnd::fill_map_state() {
 }
 
 void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
-  odometry_.advance(T_map_body);
+  odometry_.advance(T_map_body, result_.utime, std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
   result_.has_pose = true;
   result_.T_map_body = T_map_body;
   result_.T_odom_body = odometry_.T_odom_body();
