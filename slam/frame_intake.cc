@@ -131,6 +131,7 @@ std::shared_ptr<Frame> FrameIntake::take_frame(const Input& input) {
   frame->number = next_number_++;
   frame->utime = input.utime;
   frame->sequence = input.sequence;
+  frame->repeats = false;
   for (int c = 0; c < frame->views.size(); ++c) {
     FrameView& view = frame->views[c];
     view.set.features.clear();
@@ -146,7 +147,9 @@ std::shared_ptr<Frame> FrameIntake::take(const FrameInput& input) {
                                         [this](const CameraImage& image) { return takes(image); });
   if (!takes(first) || !takes_others || !advance(input.utime)) return {};
   std::shared_ptr<Frame> frame = take_frame(input);
-  if (!frame || !fill_view(first, input.most_features, frame.get())) return {};
+  if (!frame) return {};
+  frame->repeats = true;
+  if (!fill_view(first, input.most_features, frame.get())) return {};
   for (const CameraImage& other : input.others)
     if (!fill_view(other, input.most_features, frame.get())) return {};
   return frame;
@@ -159,6 +162,7 @@ bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* 
   if (!pixels) return false;
   const std::uint64_t hash = pixel_hash(input.image);
   if (std::exchange(camera.image_hash, hash) == hash) return true;
+  frame->repeats = false;
   FrameView& view = frame->views[input.camera];
   {
     const StageSpan span(listener_, Stage::kPyramid);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 namespace farpoint::slam {
@@ -13,6 +14,11 @@ namespace {
 // fusion: twice that.
 constexpr std::size_t kImuWaiting = 2048, kImuKept = 4096;
 constexpr std::size_t kWheelsWaiting = 256, kWheelsKept = 512;
+
+int quality_of(const TrackOutcome& outcome) {
+  const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
+  return static_cast<int>(std::lround(100.0 * share));
+}
 
 }  // namespace
 
@@ -65,16 +71,19 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   take_samples(*frame, limit.up_to);
   take_replies(frame->number, {limit.replies_by_delay, limit.up_to.replies});
   const bool blind = result_.features < config_.tracking.min_inliers;
+  const bool held = frame->repeats && is_valid(state_) && standstill_.explains_repeat(frame->utime);
   if (state_ == State::kInitialising) {
     if (!blind) initialise(frame);
+  } else if (held) {
+    hold_pose(*frame);
   } else if (blind) {
     skip_blind_frame();
   } else {
     follow(frame);
   }
-  if (!blind) recovery_.note_seen(frame->utime);
+  if (!blind || held) recovery_.note_seen(frame->utime);
   fill_map_state();
-  if (blind && state_ != State::kInitialising) result_.state = State::kLost;
+  if (blind && !held && state_ != State::kInitialising) result_.state = State::kLost;
   result_.jobs_under_way = static_cast<int>(port_.jobs_under_way());
   return result_;
 }
@@ -118,7 +127,10 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
   settled_ = tracker_.view()->settled;
-  if (settled_) odometry_.follow_map();
+  if (settled_) {
+    odometry_.follow_map();
+    recovery_.note_settled();
+  }
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
 }
@@ -184,8 +196,19 @@ void FrontEnd::initialise(const std::shared_ptr<Frame>& frame) {
 
 // A frame that shows nothing counts as a missing one.
 void FrontEnd::skip_blind_frame() {
+  standstill_.note_loss();
   result_.has_pose = false;
   result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
+}
+
+// The image is the one before, and the vehicle stands: so is its pose.
+void FrontEnd::hold_pose(const Frame& frame) {
+  last_outcome_.T_world_body = tracker_.T_world_body();  // a newer view may have moved it
+  record(relative_to_reference(frame, last_outcome_));
+  fill_pose(last_outcome_.T_world_body, last_outcome_.covariance);
+  result_.velocity_body.setZero();
+  result_.quality = quality_of(last_outcome_);
+  result_.view_sequence = tracker_.view()->sequence;
 }
 
 void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
@@ -240,15 +263,20 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
+  std::fprintf(stderr, "FRAME %.3f settled %d m %d i %d cm %d ci %d rms %.2f motion %.2f state %d\n",
+               1e-6 * static_cast<double>(frame->utime % 1000000000), settled_ ? 1 : 0, outcome.matches,
+               outcome.inliers, outcome.confirmed_matches, outcome.confirmed_inliers, outcome.rms,
+               outcome.median_motion_px, static_cast<int>(state_));
   fill_pose(outcome.T_world_body, outcome.covariance);
-  const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
-  result_.quality = is_valid(state_) ? static_cast<int>(std::lround(100.0 * share)) : -1;
+  result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
+  last_outcome_ = outcome;
+  standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime);
 }
 
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {
+  standstill_.note_loss();
   if (!is_lost(state_)) ++counts_.lost;
-  const int keyframes = tracker_.view() != nullptr ? tracker_.view()->map_keyframes : 0;
-  const Recovery::Verdict verdict = recovery_.note_lost(frame->utime, settled_, keyframes);
+  const Recovery::Verdict verdict = recovery_.note_lost(frame->utime);
   state_ = recovery_.state();
   if (verdict == Recovery::Verdict::kDiscardMap) give_up_map(MappingJobKind::kDiscardMap, frame);
   if (verdict == Recovery::Verdict::kRetireMap) give_up_map(MappingJobKind::kRetireMap, frame);

@@ -19,6 +19,7 @@
 #include "slam/odometry.h"
 #include "slam/recovery.h"
 #include "slam/sample_queue.h"
+#include "slam/standstill.h"
 #include "slam/tracking/initialiser.h"
 #include "slam/tracking/keyframe_policy.h"
 #include "slam/tracking/tracker.h"
@@ -76,6 +77,7 @@ class FrontEnd {
 
   void initialise(const std::shared_ptr<Frame>& frame);
   void skip_blind_frame();
+  void hold_pose(const Frame& frame);
   void follow(const std::shared_ptr<Frame>& frame);
   TrackOutcome search_for(const Frame& frame, Recovery::Search search);
   void note_relocalised(const Frame& frame, const TrackOutcome& outcome);
@@ -96,6 +98,7 @@ class FrontEnd {
   MappingPort port_;
   Recovery recovery_;
   Odometry odometry_;
+  Standstill standstill_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;
   StageListener* listener_ = nullptr;
@@ -103,6 +106,7 @@ class FrontEnd {
   State state_ = State::kInitialising;
   EstimatorCounts counts_;
   FrameResult result_;
+  TrackOutcome last_outcome_;  // accepted
 
   std::int32_t map_id_ = 0;
   bool settled_ = false;

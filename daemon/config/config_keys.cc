@@ -231,6 +231,8 @@ std::vector<ConfigKey> make_keys() {
       number("calibration.distortion_sigma", "", 1e-6, 1, FIELD(estimator.calibration.distortion_sigma)),
       number("calibration.information_share", "", 1e-4, 1, FIELD(estimator.calibration.information_share)),
       integer("calibration.min_keyframes", "keyframes", 2, 1000, FIELD(estimator.calibration.min_keyframes)),
+      number("odometry.correction_share", "", 0, 1, FIELD(estimator.odometry.correction_share)),
+      number("odometry.correction_rad_per_s", "rad/s", 0, 10, FIELD(estimator.odometry.correction_rad_per_s)),
   };
 }
 

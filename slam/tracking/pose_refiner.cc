@@ -69,9 +69,11 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
 
 void PoseRefiner::count_inliers(TrackOutcome* outcome) const {
   for (const Match& m : matcher_.matches()) {
+    const ViewLandmark& l = matcher_.landmark_of(m);
+    if (l.confirmed) ++outcome->confirmed_matches;
     if (!m.inlier) continue;
     if (m.aligned) ++outcome->aligned;
-    const ViewLandmark& l = matcher_.landmark_of(m);
+    if (l.confirmed) ++outcome->confirmed_inliers;
     if (!l.in_reference || !l.confirmed) continue;
     ++outcome->reference_inliers;
     outcome->reference_nearness += l.nearness;

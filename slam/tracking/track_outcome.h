@@ -12,6 +12,7 @@ struct TrackOutcome {
   Matrix6d covariance = Matrix6d::Zero();  // (dt, dphi) of se3.h
   int matches = 0;                         // after the local search
   int inliers = 0, aligned = 0;            // of the final pose
+  int confirmed_matches = 0, confirmed_inliers = 0;  // of landmarks whose probation has ended
   int reference_inliers = 0;               // inliers among the reference keyframe's landmarks
   double reference_nearness = 0;           // sum of their nearness, 1 / map units
   int expected = 0;                        // landmarks that project into the image
