@@ -40,13 +40,15 @@ std::shared_ptr<Frame> full_frame(const Rig& rig, int cameras, const EstimatorCo
 
 // Pyramids in use at once. Either a map is being built: its keyframes that keep theirs,
 // one more until the oldest is let go, two that began it. Or one is being looked for: the initialiser's
-// reference and every second one of half of its frames since. Besides the frame being tracked, the next
+// reference and candidates of the newer half of the time since. Besides the frame being tracked, the next
 // keyframe and the pair of a new map; and those of a map that was given up, until mapping has let them go.
 std::size_t pyramid_count(const EstimatorConfig& config) {
   constexpr std::size_t kInUse = 4, kOverlap = 4;
   const double history = static_cast<double>(Initialiser::kHistoryFrames);
   const auto looking =
-      static_cast<std::size_t>(std::min(0.25 * config.initialisation.max_frames, history)) + 4;
+      static_cast<std::size_t>(
+          std::min(0.5 * config.initialisation.max_age_s / Initialiser::kCandidateSpacing_s, history)) +
+      4;
   const std::size_t building = static_cast<std::size_t>(config.capacity.window_images) + 3;
   return std::max(looking, building) + kInUse + kOverlap;
 }

@@ -15,6 +15,10 @@ namespace {
 constexpr std::size_t kImuWaiting = 2048, kImuKept = 4096;
 constexpr std::size_t kWheelsWaiting = 256, kWheelsKept = 512;
 
+std::int64_t seconds_to_us(double s) {
+  return static_cast<std::int64_t>(std::llround(1e6 * s));
+}
+
 int quality_of(const TrackOutcome& outcome) {
   const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
   return static_cast<int>(std::lround(100.0 * share));
@@ -69,7 +73,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   result_.sequence = frame->sequence;
   result_.features = static_cast<int>(frame->feature_count());
   take_samples(*frame, limit.up_to);
-  take_replies(frame->number, {limit.replies_by_delay, limit.up_to.replies});
+  take_replies(frame->utime, {limit.replies_by_delay, limit.up_to.replies});
   const bool blind = result_.features < config_.tracking.min_inliers;
   const bool held = frame->repeats && is_valid(state_) && standstill_.explains_repeat(frame->utime);
   if (state_ == State::kInitialising) {
@@ -99,8 +103,8 @@ void FrontEnd::take_samples(const Frame& frame, const FrameTaken& up_to) {
 
 // --- mapping's replies
 
-void FrontEnd::take_replies(std::uint64_t frame_number, const ReplyLimit& limit) {
-  while (const MappingReply* reply = port_.take_reply(frame_number, limit)) {
+void FrontEnd::take_replies(std::int64_t utime, const ReplyLimit& limit) {
+  while (const MappingReply* reply = port_.take_reply(utime, limit)) {
     take_reply(*reply);
     port_.release_reply();
   }
@@ -147,10 +151,9 @@ void FrontEnd::start_map(const MappingReply& reply) {
   recovery_.begin_map();
   settled_ = false;
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
-  frames_since_keyframe_ = config_.keyframes.min_interval_frames - 1;
+  keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
   tracker_.set_view(reply.view);
-  port_.begin_map(second.number);
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });
@@ -165,7 +168,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
 
 const FrameResult& FrontEnd::take_replies_at_once() {
   const bool had_map = state_ != State::kInitialising;
-  take_replies(intake_.number(), ReplyLimit{});
+  take_replies(intake_.utime(), ReplyLimit{});
   if (!had_map && state_ != State::kInitialising) fill_map_state();
   return result_;
 }
@@ -256,7 +259,6 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   recovery_.note_tracked();
   tracker_.accept(*frame, outcome);
   record(relative_to_reference(*frame, outcome));
-  ++frames_since_keyframe_;
   maybe_keyframe(frame, outcome);
   if (settled_ && !waiting_.empty()) pose_waiting_frames();
   if (!settled_ || !outcome.agreed())
@@ -297,8 +299,8 @@ void FrontEnd::give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& fr
 
 void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
   const StageSpan span(listener_, Stage::kKeyframe);
-  if (!wants_keyframe(config_, *tracker_.view(), outcome, {frames_since_keyframe_, true})) return;
-  if (!port_.is_free(frame->number)) {
+  if (!wants_keyframe(config_, *tracker_.view(), outcome, {seconds_between(keyframe_utime_, frame->utime), true})) return;
+  if (!port_.is_free()) {
     ++counts_.keyframes_dropped;
     return;
   }
@@ -312,7 +314,7 @@ void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOu
   tracker_.sightings(&request.sightings);
   tracker_.take_counts(&request.counts);
   send_job();
-  frames_since_keyframe_ = 0;
+  keyframe_utime_ = frame->utime;
   result_.keyframe = true;
 }
 
@@ -333,7 +335,7 @@ void FrontEnd::finish() {
 }
 
 void FrontEnd::take_counts() {
-  while (const MappingReply* reply = port_.take_reply(intake_.number(), {.by_delay = false})) {
+  while (const MappingReply* reply = port_.take_reply(intake_.utime(), {.by_delay = false})) {
     note_counts(*reply);
     port_.release_reply();
   }

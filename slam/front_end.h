@@ -67,7 +67,7 @@ class FrontEnd {
   const FrameResult& step(const std::shared_ptr<Frame>& frame, const TakeLimit& limit);
 
   void take_samples(const Frame& frame, const FrameTaken& up_to);
-  void take_replies(std::uint64_t frame_number, const ReplyLimit& limit);
+  void take_replies(std::int64_t utime, const ReplyLimit& limit);
   void take_reply(const MappingReply& reply);
   void note_counts(const MappingReply& reply);
   void take_view(std::shared_ptr<const LocalView> view);
@@ -111,7 +111,7 @@ class FrontEnd {
   std::int32_t map_id_ = 0;
   bool settled_ = false;
   std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;  // that a map is being made from
-  int frames_since_keyframe_ = 0;
+  std::int64_t keyframe_utime_ = 0;  // of the last keyframe sent
   // Frames from before the map, posed once it has settled.
   std::vector<std::shared_ptr<Frame>> waiting_;
   std::uint64_t last_before_map_ = 0;

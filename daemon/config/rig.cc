@@ -59,8 +59,9 @@ double pyramid_share(const slam::PyramidOptions& options) {
 
 // As slam/frame_intake.cc counts them; a test compares the two.
 double pyramids(const slam::EstimatorConfig& config) {
-  constexpr double kHistoryFrames = 60.0, kInUse = 8.0;
-  const double looking = std::min(0.25 * config.initialisation.max_frames, kHistoryFrames) + 4.0;
+  constexpr double kHistoryFrames = 60.0, kCandidateSpacing_s = 0.2, kInUse = 8.0;
+  const double looking =
+      std::min(0.5 * config.initialisation.max_age_s / kCandidateSpacing_s, kHistoryFrames) + 4.0;
   return std::max(looking, config.capacity.window_images + 3.0) + kInUse;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "slam/image/descriptor_search.h"
+#include "slam/tracking/constant_velocity.h"
 #include "slam/tracking/work_space.h"
 
 namespace farpoint::slam {
@@ -18,6 +19,8 @@ constexpr int kMinMatches = 80;
 // next to the reference gave, chance matches prevail.
 constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
+// A frame that comes a little early counts as in time.
+constexpr double kEarly_s = 0.001;
 
 }  // namespace
 
@@ -63,12 +66,19 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   for (const Feature& f : view_of(*reference_).set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
 
-// Only a frame about half way between the reference and now can be the next reference. What is older never
-// can again, and every second frame will do: the other pixels go back to the pool.
-void Initialiser::forget_pixels(std::uint64_t age) {
-  const std::uint64_t half = reference_->number + (age + 1) / 2;
-  for (const std::shared_ptr<Frame>& f : history_)
-    if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->drop_pixels();
+// Only a frame about half way between the reference and now can be the next reference. Pixels of older ones
+// go back to the pool, and of those nearer than kCandidateSpacing_s to the candidate before.
+void Initialiser::forget_pixels(std::int64_t half_utime) {
+  std::int64_t last_utime = reference_->utime;
+  for (const std::shared_ptr<Frame>& f : history_) {
+    if (f == reference_ || f == history_.back()) continue;
+    const bool candidate = f->utime >= half_utime && f->has_pixels() &&
+                           seconds_between(last_utime, f->utime) > kCandidateSpacing_s - kEarly_s;
+    if (candidate)
+      last_utime = f->utime;
+    else
+      f->drop_pixels();
+  }
 }
 
 void Initialiser::match(const Frame& frame) {
@@ -164,17 +174,18 @@ const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
   }
   match(*frame);
   last_matches_ = static_cast<int>(pairs_.size());
-  const auto age = frame->number - reference_->number;
+  const std::int64_t age_us = frame->utime - reference_->utime;
+  const std::int64_t half_utime = reference_->utime + age_us / 2;
   most_matches_ = std::max(most_matches_, last_matches_);
-  forget_pixels(age);
+  forget_pixels(half_utime);
   const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * most_matches_));
-  if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
+  if (last_matches_ < wanted || 1e-6 * static_cast<double>(age_us) > config_.initialisation.max_age_s) {
     // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,
     // or there is none, this one.
-    const std::uint64_t half = reference_->number + (age + 1) / 2;
-    const auto next = std::find_if(history_.begin(), history_.end(),
-                                   [&](const auto& f) { return f->number >= half && f->has_pixels(); });
-    set_reference(next != history_.end() && age > 1 ? *next : frame);
+    const auto next = std::find_if(history_.begin(), history_.end(), [&](const auto& f) {
+      return f != reference_ && f->utime >= half_utime && f->has_pixels();
+    });
+    set_reference(next != history_.end() ? *next : frame);
     match(*frame);
     last_matches_ = static_cast<int>(pairs_.size());
     most_matches_ = last_matches_;

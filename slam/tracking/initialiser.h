@@ -20,6 +20,8 @@ class Initialiser {
  public:
   // Frames that are kept to be posed once there is a map.
   static constexpr std::size_t kHistoryFrames = 60;
+  // Least time between two frames of which one may become the next reference: these keep their pixels.
+  static constexpr double kCandidateSpacing_s = 0.2;
 
   // `camera`: whose images are used.
   Initialiser(const EstimatorConfig& config, const Rig& rig, int camera = 0);
@@ -42,7 +44,7 @@ class Initialiser {
   };
   [[nodiscard]] const FrameView& view_of(const Frame& frame) const { return frame.views[camera_]; }
   void set_reference(std::shared_ptr<Frame> frame);
-  void forget_pixels(std::uint64_t age);
+  void forget_pixels(std::int64_t half_utime);
   // Fills pairs_.
   void match(const Frame& frame);
   // Fills pair_ from pairs_. False where they give no motion or too few points.
