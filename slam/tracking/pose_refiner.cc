@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "slam/tracking/work_space.h"
 
@@ -38,6 +39,9 @@ PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& 
     pm.inverse_depth_sigma = l.inverse_depth_sigma;
     pm.pixel = m.pixel.cast<double>();
     pm.sigma_px = m.sigma_px;
+    static const char* own = std::getenv("OWN");
+    if (own != nullptr && l.inverse_depth_sigma > 0.049 * l.point_w[3])
+      pm.sigma_px = std::hypot(m.sigma_px, std::atof(own) * matcher_.camera(m.camera).camera.focal_px());
     pm.camera = m.camera;
     measurements_.push_back(pm);
   }
