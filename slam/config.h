@@ -43,10 +43,10 @@ struct TrackingConfig {
 };
 
 struct KeyframeConfig {
-  double tracked_ratio = 0.85;   // of the reference keyframe's landmarks: fewer, new keyframe
-  double min_interval_s = 0.15;      // between two keyframes: the local window must reach back far enough
-  double max_interval_s = 1.0;       // with motion
-  double min_parallax_rad = 0.021;   // median motion since the last keyframe that asks for a new one
+  double tracked_ratio = 0.85;      // of the reference keyframe's landmarks: fewer, new keyframe
+  double min_interval_s = 0.15;     // between two keyframes: the local window must reach back far enough
+  double max_interval_s = 1.0;      // with motion
+  double min_parallax_rad = 0.021;  // median motion since the last keyframe that asks for a new one
 };
 
 struct LandmarkConfig {

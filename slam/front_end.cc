@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
 namespace farpoint::slam {
@@ -265,10 +264,6 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
-  std::fprintf(stderr, "FRAME %.3f settled %d m %d i %d cm %d ci %d rms %.2f motion %.2f state %d\n",
-               1e-6 * static_cast<double>(frame->utime % 1000000000), settled_ ? 1 : 0, outcome.matches,
-               outcome.inliers, outcome.confirmed_matches, outcome.confirmed_inliers, outcome.rms,
-               outcome.median_motion_px, static_cast<int>(state_));
   fill_pose(outcome.T_world_body, outcome.covariance);
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
   last_outcome_ = outcome;
@@ -299,7 +294,9 @@ void FrontEnd::give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& fr
 
 void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
   const StageSpan span(listener_, Stage::kKeyframe);
-  if (!wants_keyframe(config_, *tracker_.view(), outcome, {seconds_between(keyframe_utime_, frame->utime), true})) return;
+  if (!wants_keyframe(config_, *tracker_.view(), outcome,
+                      {seconds_between(keyframe_utime_, frame->utime), true}))
+    return;
   if (!port_.is_free()) {
     ++counts_.keyframes_dropped;
     return;

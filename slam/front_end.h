@@ -111,7 +111,7 @@ class FrontEnd {
   std::int32_t map_id_ = 0;
   bool settled_ = false;
   std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;  // that a map is being made from
-  std::int64_t keyframe_utime_ = 0;  // of the last keyframe sent
+  std::int64_t keyframe_utime_ = 0;                                       // of the last keyframe sent
   // Frames from before the map, posed once it has settled.
   std::vector<std::shared_ptr<Frame>> waiting_;
   std::uint64_t last_before_map_ = 0;

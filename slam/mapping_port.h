@@ -33,8 +33,8 @@ class MappingPort {
   // Sends it. Returns its number.
   std::uint64_t send_job();
 
-  // The oldest reply that the frame at `utime` may take; null where none is due. In use until release_reply(). Each
-  // reply is given once.
+  // The oldest reply that the frame at `utime` may take; null where none is due. In use until
+  // release_reply(). Each reply is given once.
   [[nodiscard]] const MappingReply* take_reply(std::int64_t utime, const ReplyLimit& limit);
   void release_reply();
   // False for a reply to a job of a map that was given up.

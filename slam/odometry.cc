@@ -39,7 +39,8 @@ void Odometry::aim_at(const SE3& T_odom_body, const SE3& T_map_body) {
 }
 
 void Odometry::advance(const SE3& T_map_body, std::int64_t utime, double sigma) {
-  if (has_last_) T_odom_body_ = T_odom_body_ * in_unit(T_map_body_last_.inverse() * T_map_body, 1.0 / map_units_);
+  if (has_last_)
+    T_odom_body_ = T_odom_body_ * in_unit(T_map_body_last_.inverse() * T_map_body, 1.0 / map_units_);
   T_map_body_last_ = T_map_body;
   if (!has_last_ || !follows_) {
     aim_at(T_odom_body_, T_map_body);
@@ -62,8 +63,8 @@ void Odometry::take_corrections(const SE3& T_map_body, std::int64_t utime, doubl
   const Eigen::AngleAxisd turn(missing.q);
   SE3 step;
   step.t = shortened(missing.t.norm(), config_.correction_share * way) * missing.t;
-  step.q = Eigen::AngleAxisd(
-      turn.angle() * shortened(turn.angle(), config_.correction_rad_per_s * time_s), turn.axis());
+  step.q = Eigen::AngleAxisd(turn.angle() * shortened(turn.angle(), config_.correction_rad_per_s * time_s),
+                             turn.axis());
   T_odom_body_ = T_odom_body_ * step;
   T_odom_body_corrected_ = T_odom_body_;
   corrected_utime_ = utime;

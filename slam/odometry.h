@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame `odom`: integrates relative motion, and follows the map's corrections at a bounded rate, so that a
-// controller sees no step. A change of the map's unit goes into map_from_odom alone. A new map raises the
+// The frame `odom`: integrates relative motion, and follows the map's corrections at a bounded rate, so that
+// a controller sees no step. A change of the map's unit goes into map_from_odom alone. A new map raises the
 // reset counter.
 #pragma once
 

@@ -49,7 +49,7 @@ class Recovery {
   [[nodiscard]] bool after_gap(std::int64_t utime) const;
 
   bool ever_settled_ = false;  // the present map
-  int lost_frames_ = 0;  // searched in vain, one after another
+  int lost_frames_ = 0;        // searched in vain, one after another
   std::int64_t lost_since_utime_ = 0;
   std::optional<RecordedFrame> candidate_;
   // Of frames that showed something.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images equal to the one before, bit for bit: a vehicle that stands behind an encoder shows them, and so does
-// a stream that is frozen. They count as a standing vehicle where it stood before, and for a limited time.
+// Images equal to the one before, bit for bit: a vehicle that stands behind an encoder shows them, and so
+// does a stream that is frozen. They count as a standing vehicle where it stood before, and for a limited
+// time.
 #pragma once
 
 #include <cstdint>

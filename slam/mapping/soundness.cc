@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cstdio>
 #include <vector>
 
 namespace farpoint::slam {
@@ -20,7 +19,6 @@ struct Field {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero(), normal2 = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
   double squares = 0;
-  double focal_px = 1.0;
 
   void add(const Eigen::Vector3d& place, const Eigen::Vector2d& residual, double w) {
     weight += w;
@@ -32,19 +30,6 @@ struct Field {
   }
   // Number of equal weights with the same information.
   [[nodiscard]] double measurements() const { return weight2 > 0.0 ? weight * weight / weight2 : 0.0; }
-  double excess() const {  // debugging: mean square of the field, without chance
-    const auto solver = normal.ldlt();
-    const double explained = solver.solve(right).cwiseProduct(right).sum();
-    const double by_chance = 2.0 * solver.solve(normal2).trace(), rest = 2.0 * weight - by_chance;
-    const double s2 = (squares - explained) / rest;
-    return (explained - by_chance * s2) / weight;
-  }
-  double noise2() const {
-    const auto solver = normal.ldlt();
-    const double explained = solver.solve(right).cwiseProduct(right).sum();
-    const double by_chance = 2.0 * solver.solve(normal2).trace(), rest = 2.0 * weight - by_chance;
-    return (squares - explained) / rest;
-  }
   // The weights are no inverse variances. The part of independent, equal errors that the field explains is
   // therefore a trace, not its number of parameters.
   [[nodiscard]] double f_statistic() const {
@@ -118,41 +103,7 @@ bool Soundness::fits_well(bool held_before) const {
   return mean_chi2 <= (held_before ? kStillGood : kGood);
 }
 
-void debug_fields(const BundleProblem& problem) {
-  BundleFrames frames;
-  frames.update(problem);
-  const std::size_t cameras = problem.rig->cameras.size();
-  std::vector<Field> fields(problem.poses.size() * cameras);
-  for (const BundleProblem::Point& point : problem.points) {
-    const BundleFrames::WorldPoint world = frames.world_point(point);
-    for (int i = 0; i < point.measurements; ++i) {
-      const int index = point.first_measurement + i;
-      const auto& m = problem.measurements[static_cast<std::size_t>(index)];
-      const auto pose = static_cast<std::size_t>(m.pose);
-      if (m.pose == point.host || problem.poses[pose].fixed || m.chi2 > kChi2TwoDof) continue;
-      Eigen::Vector2d residual;
-      if (residual_world(world, frames.view(m), m, &residual))
-        fields[pose * cameras + static_cast<std::size_t>(m.camera)].add(place_of(problem, m),
-                                                                        residual * m.sigma_px, point.weight);
-    }
-  }
-  double sum = 0, noise = 0, worst = 0;
-  int count = 0;
-  for (const Field& field : fields)
-    if (field.measurements() >= kLeastMeasurements)
-      sum += field.excess(), noise += field.noise2(), worst = std::max(worst, field.excess()), ++count;
-  const double f = problem.rig->cameras[0].camera.focal_px();
-  if (count > 0)
-    std::fprintf(stderr, "FIELD rms_px %.3f worst_px %.3f noise_px %.3f rms_mrad %.3f n %d ",
-                 std::sqrt(std::max(0.0, sum / count)), std::sqrt(std::max(0.0, worst)), std::sqrt(noise / count),
-                 1e3 * std::sqrt(std::max(0.0, sum / count)) / f, count);
-  else
-    std::fprintf(stderr, "FIELD rms_px 0 worst_px 0 noise_px 0 rms_mrad 0 n 0 ");
-  std::fprintf(stderr, "chi2 %.3f coherence %.3f points %zu\n", mean_chi2_of(problem), coherence_of(problem), problem.points.size());
-}
-
 Soundness soundness_of(const BundleProblem& problem) {
-  debug_fields(problem);
   return {mean_chi2_of(problem), coherence_of(problem)};
 }
 

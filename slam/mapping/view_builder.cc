@@ -2,7 +2,6 @@
 #include "slam/mapping/view_builder.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "slam/mapping/neighbours.h"
 
@@ -58,10 +57,6 @@ std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bo
   std::sort(view->keyframes.begin(), view->keyframes.end(),
             [](const ViewKeyframe& a, const ViewKeyframe& b) { return a.id < b.id; });
   if (!depths_.empty()) view->median_depth = median_depth();
-  if (const char* k = std::getenv("VMPK"))
-    for (ViewLandmark& v : view->landmarks)
-      if (map_.landmarks()[v.handle].state == LandmarkState::kBearing)
-        v.inverse_depth_sigma = std::max(v.inverse_depth_sigma, std::atof(k) / view->median_depth);
   return view;
 }
 
@@ -130,6 +125,7 @@ ViewLandmark ViewBuilder::make_landmark(LandmarkHandle handle, const Landmark& l
   v.anchor_w = in.anchor_w;
   v.d_point_d_pixel = in.d_point_d_pixel;
   v.inverse_depth_sigma = l.inverse_depth_sigma;
+  v.own_motion_rad = map_.is_wide(l) ? 0.0F : static_cast<float>(kOwnMotion_rad);
   v.descriptor = l.descriptor;
   v.patch = l.patch;
   v.host_level = l.host_level;
