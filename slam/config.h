@@ -90,7 +90,7 @@ struct CalibrationConfig {
 
 // How fast the frame `odom` follows the map's corrections.
 struct OdometryConfig {
-  double correction_share = 0.02;        // of the way driven
+  double correction_share = 0.1;         // of the way driven
   double correction_rad_per_s = 0.0175;  // turn, while the vehicle moves: one degree a second
 };
 

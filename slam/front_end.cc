@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <optional>
 
 namespace farpoint::slam {
@@ -129,8 +131,7 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
-  settled_ = tracker_.view()->settled;
-  if (settled_) {
+  if (tracker_.view()->judgement.steady) {
     odometry_.follow_map();
     recovery_.note_settled();
   }
@@ -148,7 +149,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
   ++counts_.maps;
   odometry_.begin_map();
   recovery_.begin_map();
-  settled_ = false;
+  validity_.begin_map();
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
   keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
@@ -259,19 +260,25 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   tracker_.accept(*frame, outcome);
   record(relative_to_reference(*frame, outcome));
   maybe_keyframe(frame, outcome);
-  if (settled_ && !waiting_.empty()) pose_waiting_frames();
-  if (!settled_ || !outcome.agreed())
+  const MapJudgement& judgement = tracker_.view()->judgement;
+  if (judgement.settled(frame->utime) && !waiting_.empty()) pose_waiting_frames();
+  if (!validity_.note_tracked(frame->utime, judgement, outcome))
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
   fill_pose(outcome.T_world_body, outcome.covariance);
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
   last_outcome_ = outcome;
+  if (std::getenv("SND") != nullptr)
+    std::fprintf(stderr, "TRK utime %ld state %d settled %d matches %d inliers %d cm %d ci %d rms %.3f\n",
+                 frame->utime, int(state_), int(validity_.refusal().reason), outcome.matches, outcome.inliers,
+                 outcome.confirmed_matches, outcome.confirmed_inliers, outcome.rms);
   standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime);
 }
 
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {
   standstill_.note_loss();
+  validity_.note_lost();
   if (!is_lost(state_)) ++counts_.lost;
   const Recovery::Verdict verdict = recovery_.note_lost(frame->utime);
   state_ = recovery_.state();

@@ -23,6 +23,7 @@
 #include "slam/tracking/initialiser.h"
 #include "slam/tracking/keyframe_policy.h"
 #include "slam/tracking/tracker.h"
+#include "slam/validity.h"
 
 namespace farpoint::slam {
 
@@ -99,6 +100,7 @@ class FrontEnd {
   Recovery recovery_;
   Odometry odometry_;
   Standstill standstill_;
+  Validity validity_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;
   StageListener* listener_ = nullptr;
@@ -109,7 +111,6 @@ class FrontEnd {
   TrackOutcome last_outcome_;  // accepted
 
   std::int32_t map_id_ = 0;
-  bool settled_ = false;
   std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;  // that a map is being made from
   std::int64_t keyframe_utime_ = 0;                                       // of the last keyframe sent
   // Frames from before the map, posed once it has settled.

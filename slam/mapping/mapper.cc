@@ -192,7 +192,8 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   ++counts_.local_ba;
   if (!summary.usable) return false;
   const Soundness soundness = soundness_of(problem);
-  settling_.note_adjustment(soundness, window_.take_back(), calibrator_.contradicts_given());
+  const std::int64_t utime = map_.keyframes()[centre].utime;
+  settling_.note_adjustment(soundness, window_.take_back(), calibrator_.contradicts_given(), utime);
   return true;
 }
 

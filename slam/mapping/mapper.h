@@ -72,7 +72,7 @@ class Mapper {
   void refine_calibration();
   void forget(KeyframeHandle newest);
   [[nodiscard]] std::shared_ptr<const LocalView> make_view(KeyframeHandle reference) {
-    return view_builder_.build(reference, settling_.settled());
+    return view_builder_.build(reference, settling_.judgement());
   }
 
   const EstimatorConfig config_;
