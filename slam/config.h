@@ -44,7 +44,7 @@ struct TrackingConfig {
 
 struct KeyframeConfig {
   double tracked_ratio = 0.85;      // of the reference keyframe's landmarks: fewer, new keyframe
-  double min_interval_s = 0.15;     // between two keyframes: the local window must reach back far enough
+  double min_interval_s = 0.13;     // between two keyframes: the local window must reach back far enough
   double max_interval_s = 1.0;      // with motion
   double min_parallax_rad = 0.021;  // median motion since the last keyframe that asks for a new one
 };
@@ -71,7 +71,7 @@ struct MappingConfig {
   int fixed_keyframes = 40;         // historical observers held fixed
   int iterations = 8;               // LM steps, never a time limit
   double quick_view_delay_ms = 50;  // lockstep: from a keyframe to the view with its triangulation
-  double full_view_delay_ms = 150;  // lockstep: from a keyframe to the view after its local BA
+  double full_view_delay_ms = 100;  // lockstep: from a keyframe to the view after its local BA
   std::string solver = "schur";     // schur | ceres
   // Solves instead of the estimator's own solver. Required where `solver` is ceres.
   SolveBundle solve_instead = nullptr;

@@ -34,6 +34,7 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       tracker_(config),
       port_(config.mapping, rings),
       odometry_(config.odometry),
+      repeated_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept) {
   waiting_.reserve(2 * Initialiser::kHistoryFrames);
@@ -75,6 +76,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   result_.features = static_cast<int>(frame->feature_count());
   take_samples(*frame, limit.up_to);
   take_replies(frame->utime, {limit.replies_by_delay, limit.up_to.replies});
+  repeated_share_ = repeated_.add(frame->views[0].set);
   const bool blind = result_.features < config_.tracking.min_inliers;
   const bool held = frame->repeats && is_valid(state_) && standstill_.explains_repeat(frame->utime);
   if (state_ == State::kInitialising) {
@@ -89,6 +91,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   if (!blind || held) recovery_.note_seen(frame->utime);
   fill_map_state();
   if (blind && !held && state_ != State::kInitialising) result_.state = State::kLost;
+  result_.refusal = refusal_of(*frame, blind && !held);
   result_.jobs_under_way = static_cast<int>(port_.jobs_under_way());
   return result_;
 }
@@ -100,6 +103,26 @@ void FrontEnd::take_samples(const Frame& frame, const FrameTaken& up_to) {
   counts_.wheels = wheels_.counts();
   result_.taken.imu = counts_.imu.taken();
   result_.taken.wheels = counts_.wheels.taken();
+}
+
+Refusal FrontEnd::refusal_of(const Frame& frame, bool blind) const {
+  if (blind && frame.repeats) return {.reason = Reason::kFrozenImage};
+  if (blind)
+    return {Reason::kTooDark, static_cast<double>(result_.features),
+            static_cast<double>(config_.tracking.min_inliers)};
+  switch (state_) {
+    case State::kInitialising:
+      return initialiser_.refusal();
+    case State::kSettling:
+      return validity_.refusal();
+    case State::kLost:
+      return {Reason::kLost, static_cast<double>(result_.inliers),
+              static_cast<double>(config_.tracking.min_inliers)};
+    case State::kRelocalising:
+      return {.reason = Reason::kPlaceNotRecognised};
+    default:
+      return {};
+  }
 }
 
 // --- mapping's replies
@@ -262,7 +285,8 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   maybe_keyframe(frame, outcome);
   const MapJudgement& judgement = tracker_.view()->judgement;
   if (judgement.settled(frame->utime) && !waiting_.empty()) pose_waiting_frames();
-  if (!validity_.note_tracked(frame->utime, judgement, outcome))
+  const double repeated_share = standstill_.stands() ? 0.0 : repeated_share_;
+  if (!validity_.note_tracked(frame->utime, judgement, outcome, repeated_share))
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
@@ -381,6 +405,7 @@ std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const 
   auto table = intake_.memory_table();
   table.emplace_back("tracker", tracker_.bytes());
   table.emplace_back("initialiser", initialiser_.bytes());
+  table.emplace_back("repeated features", repeated_.bytes());
   table.emplace_back("sensor samples", imu_.bytes() + wheels_.bytes());
   return table;
 }

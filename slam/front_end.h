@@ -22,6 +22,7 @@
 #include "slam/standstill.h"
 #include "slam/tracking/initialiser.h"
 #include "slam/tracking/keyframe_policy.h"
+#include "slam/tracking/repeated_features.h"
 #include "slam/tracking/tracker.h"
 #include "slam/validity.h"
 
@@ -65,6 +66,8 @@ class FrontEnd {
 
  private:
   const FrameResult& reject(std::int64_t utime);
+  // Why the present frame has no valid pose.
+  [[nodiscard]] Refusal refusal_of(const Frame& frame, bool blind) const;
   const FrameResult& step(const std::shared_ptr<Frame>& frame, const TakeLimit& limit);
 
   void take_samples(const Frame& frame, const FrameTaken& up_to);
@@ -100,6 +103,8 @@ class FrontEnd {
   Recovery recovery_;
   Odometry odometry_;
   Standstill standstill_;
+  RepeatedFeatures repeated_;
+  double repeated_share_ = 0;  // of the present frame
   Validity validity_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;

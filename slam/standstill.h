@@ -23,6 +23,7 @@ class Standstill {
   // A frame without a pose: whether the vehicle stands is unknown.
   void note_loss() { stands_ = false; }
 
+  [[nodiscard]] bool stands() const { return stands_; }
   // Whether a frame at `utime` that repeats the one before shows a vehicle that stands.
   [[nodiscard]] bool explains_repeat(std::int64_t utime) const;
 

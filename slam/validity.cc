@@ -23,11 +23,12 @@ void Validity::begin_map() {
   refusal_ = {};
 }
 
-bool Validity::agrees(std::int64_t utime, const TrackOutcome& outcome) {
+bool Validity::agrees(std::int64_t utime, const TrackOutcome& outcome, double repeated_share) {
+  const bool frozen = repeated_share > kFrozenShare;
   const bool few = outcome.confirmed_inliers < kLeastKnown;
   const double share = share_of(outcome), least = agreed_ ? kDoubtedShare : kAgreedShare;
   // A change of mind: agreed_ turns once it has lasted.
-  const bool changes = (few || share < least) == agreed_;
+  const bool changes = (frozen || few || share < least) == agreed_;
   if (changes && !doubt_) since_utime_ = utime;
   doubt_ = changes;
   if (changes && 1e-6 * static_cast<double>(utime - since_utime_) >= (agreed_ ? kDoubt_s : kAgreement_s)) {
@@ -35,14 +36,19 @@ bool Validity::agrees(std::int64_t utime, const TrackOutcome& outcome) {
     doubt_ = false;
   }
   if (agreed_) return true;
-  refusal_ = few ? Refusal{Reason::kFewLandmarks, static_cast<double>(outcome.confirmed_inliers), kLeastKnown}
-                 : Refusal{Reason::kDisagreement, share, kAgreedShare};
+  if (frozen)
+    refusal_ = {Reason::kFrozenImage, repeated_share, kFrozenShare};
+  else
+    refusal_ =
+        few ? Refusal{Reason::kFewLandmarks, static_cast<double>(outcome.confirmed_inliers), kLeastKnown}
+            : Refusal{Reason::kDisagreement, share, kAgreedShare};
   return false;
 }
 
-bool Validity::note_tracked(std::int64_t utime, const MapJudgement& judgement, const TrackOutcome& outcome) {
+bool Validity::note_tracked(std::int64_t utime, const MapJudgement& judgement, const TrackOutcome& outcome,
+                            double repeated_share) {
   refusal_ = {};
-  const bool agreed = agrees(utime, outcome);
+  const bool agreed = agrees(utime, outcome, repeated_share);
   if (agreed) refusal_ = refusal_of(judgement, utime);
   return agreed && refusal_.reason == Reason::kNone;
 }

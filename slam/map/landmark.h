@@ -12,11 +12,6 @@
 
 namespace farpoint::slam {
 
-// A landmark without wide parallax is far away or moves: clouds drift by 1 to 2 mrad/s, a car ahead keeps its
-// place in the image. A hundred of them look like a turn or a slower vehicle: the scale drifted by up to 4 %,
-// and tracking's heading by 10 mrad/s. 1 sigma.
-inline constexpr double kOwnMotion_rad = 0.003;
-
 struct Keyframe;
 struct Landmark;
 using KeyframeHandle = Handle<Keyframe>;

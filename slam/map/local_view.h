@@ -19,7 +19,6 @@ struct ViewLandmark {
   Eigen::Vector3d anchor_w = Eigen::Vector3d::Zero();  // centre of the anchor camera
   Eigen::Matrix<double, 3, 2> d_point_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();  // of xyz, world axes
   double inverse_depth_sigma = 0;
-  float own_motion_rad = 0;  // 1 sigma of what it may have moved by itself, seen from the camera
   Descriptor descriptor;
   Patch patch;
   std::uint8_t host_level = 0;

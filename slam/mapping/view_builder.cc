@@ -125,7 +125,6 @@ ViewLandmark ViewBuilder::make_landmark(LandmarkHandle handle, const Landmark& l
   v.anchor_w = in.anchor_w;
   v.d_point_d_pixel = in.d_point_d_pixel;
   v.inverse_depth_sigma = l.inverse_depth_sigma;
-  v.own_motion_rad = map_.is_wide(l) ? 0.0F : static_cast<float>(kOwnMotion_rad);
   v.descriptor = l.descriptor;
   v.patch = l.patch;
   v.host_level = l.host_level;

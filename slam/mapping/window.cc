@@ -10,6 +10,9 @@ namespace {
 // All measurements of a landmark are of its one host patch and share its error: noise in its pixels, a
 // surface that is not flat. That part does not average out; 1 sigma.
 constexpr double kPatchSigma_px = 0.2;
+// A landmark without wide parallax is far away or moves: clouds drift by 1 to 2 mrad/s, a car ahead keeps its
+// place in the image. A hundred of them look like a slower vehicle: the scale drifted by up to 4 %.
+constexpr double kOwnMotion_rad = 0.003;
 // A host outside the window counts as this many sightings: a landmark has no place without its host.
 constexpr int kHostUses = 1000;
 

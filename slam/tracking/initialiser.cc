@@ -19,6 +19,8 @@ constexpr int kMinMatches = 80;
 // next to the reference gave, chance matches prevail.
 constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
+// A rotation by less is a vehicle that stands and shakes.
+constexpr double kTurn_rad = 0.02;
 // A frame that comes a little early counts as in time.
 constexpr double kEarly_s = 0.001;
 
@@ -37,13 +39,15 @@ Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig, int came
   reserve_touched(&first_, features);
   reserve_touched(&second_, features);
   reserve_touched(&used_, features);
+  reserve_touched(&parallax_rad_, features);
   two_view_.reserve(features);
 }
 
 std::size_t Initialiser::bytes() const {
   return capacity_bytes(expected_px_) + capacity_bytes(pairs_) + capacity_bytes(pair_.points) +
          capacity_bytes(owner_) + capacity_bytes(found_) + capacity_bytes(owner_distance_) +
-         capacity_bytes(first_) + capacity_bytes(second_) + capacity_bytes(used_) + two_view_.bytes();
+         capacity_bytes(first_) + capacity_bytes(second_) + capacity_bytes(used_) +
+         capacity_bytes(parallax_rad_) + two_view_.bytes();
 }
 
 void Initialiser::remember(std::shared_ptr<Frame> frame) {
@@ -144,11 +148,41 @@ bool Initialiser::shows_parallax(const TwoViewResult& motion) const {
                                           static_cast<std::ptrdiff_t>(motion.inliers / 4));
 }
 
+Refusal Initialiser::refusal_of(const TwoViewResult& motion) {
+  switch (motion.status) {
+    case TwoViewStatus::kTooFewMatches:
+      return {Reason::kFewMatches, static_cast<double>(last_matches_), kMinMatches};
+    case TwoViewStatus::kNoParallax: {
+      const double turn_rad = Eigen::AngleAxisd(motion.T_2_1.q).angle();
+      return {turn_rad > kTurn_rad ? Reason::kTurningOnly : Reason::kStanding, turn_rad};
+    }
+    case TwoViewStatus::kAmbiguous:
+      return {.reason = Reason::kAmbiguousStart};
+    case TwoViewStatus::kPoorModel:
+      return {
+          Reason::kNoCommonMotion,
+          static_cast<double>(motion.inliers) / static_cast<double>(std::max<std::size_t>(motion.matches, 1)),
+          TwoViewOptions{}.min_inlier_share};
+    case TwoViewStatus::kOk:
+      break;
+  }
+  parallax_rad_.clear();
+  for (std::size_t i = 0; i < motion.parallax_rad.size(); ++i)
+    if (motion.inlier[i] != 0) parallax_rad_.push_back(motion.parallax_rad[i]);
+  if (parallax_rad_.empty()) return {.reason = Reason::kAmbiguousStart};
+  const auto quarter = parallax_rad_.begin() + static_cast<std::ptrdiff_t>(3 * parallax_rad_.size() / 4);
+  std::nth_element(parallax_rad_.begin(), quarter, parallax_rad_.end());
+  return {Reason::kLittleParallax, *quarter, config_.initialisation.min_parallax_rad};
+}
+
 bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
   unproject_pairs(*frame);
   const TwoViewResult& r =
       estimate_two_view(first_, second_, kCornerSigma_px / rig_camera_.camera.focal_px(), {}, &two_view_);
-  if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) return false;
+  if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) {
+    refusal_ = refusal_of(r);
+    return false;
+  }
   pair_.first = reference_;
   pair_.second = frame;
   pair_.camera = camera_;
@@ -161,7 +195,10 @@ bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
     if (r.inlier[i] == 0 || r.inverse_depth[i] <= 0.0) continue;
     pair_.points.push_back({used_[i].feature_first, used_[i].feature_second, r.inverse_depth[i]});
   }
-  return static_cast<int>(pair_.points.size()) >= config_.initialisation.min_landmarks;
+  const int points = static_cast<int>(pair_.points.size());
+  refusal_ = {Reason::kFewMatches, static_cast<double>(points),
+              static_cast<double>(config_.initialisation.min_landmarks)};
+  return points >= config_.initialisation.min_landmarks;
 }
 
 const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
@@ -170,6 +207,7 @@ const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
   remember(frame);
   if (!reference_) {
     set_reference(frame);
+    refusal_ = {.reason = Reason::kStanding};
     return nullptr;
   }
   match(*frame);
@@ -189,6 +227,7 @@ const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
     match(*frame);
     last_matches_ = static_cast<int>(pairs_.size());
     most_matches_ = last_matches_;
+    refusal_ = {Reason::kFewMatches, static_cast<double>(last_matches_), static_cast<double>(wanted)};
     if (last_matches_ < wanted) set_reference(frame);
     return nullptr;
   }

@@ -13,6 +13,7 @@
 #include "slam/config.h"
 #include "slam/geometry/two_view.h"
 #include "slam/map/request.h"
+#include "slam/refusal.h"
 
 namespace farpoint::slam {
 
@@ -35,6 +36,8 @@ class Initialiser {
   // Frames waited with, oldest first: to be posed once there is a map.
   [[nodiscard]] const std::vector<std::shared_ptr<Frame>>& history() const { return history_; }
   [[nodiscard]] int last_matches() const { return last_matches_; }
+  // Why the last frame gave no pair.
+  [[nodiscard]] const Refusal& refusal() const { return refusal_; }
   // Bytes of the work space.
   [[nodiscard]] std::size_t bytes() const;
 
@@ -51,6 +54,7 @@ class Initialiser {
   [[nodiscard]] bool solve(const std::shared_ptr<Frame>& frame);
   void unproject_pairs(const Frame& frame);
   [[nodiscard]] bool shows_parallax(const TwoViewResult& motion) const;
+  [[nodiscard]] Refusal refusal_of(const TwoViewResult& motion);
 
   const EstimatorConfig config_;
   const int camera_;
@@ -60,6 +64,7 @@ class Initialiser {
   std::vector<Eigen::Vector2f> expected_px_;  // where each reference feature was seen last
   std::vector<Pairing> pairs_;
   InitialPair pair_;
+  Refusal refusal_;
   int last_matches_ = 0;
   int most_matches_ = 0;  // with the present reference
   // Work space of one match.
@@ -68,6 +73,7 @@ class Initialiser {
   // Work space of one solution: one entry a pair of which both features have a ray.
   std::vector<Eigen::Vector3d> first_, second_;
   std::vector<Pairing> used_;
+  std::vector<double> parallax_rad_;  // of inliers
   TwoViewWorkspace two_view_;
 };
 

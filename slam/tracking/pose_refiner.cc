@@ -38,9 +38,6 @@ PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& 
     pm.inverse_depth_sigma = l.inverse_depth_sigma;
     pm.pixel = m.pixel.cast<double>();
     pm.sigma_px = m.sigma_px;
-    const double own_motion_px = double{l.own_motion_rad} * matcher_.camera(m.camera).camera.focal_px();
-    const double variance_px2 = pm.sigma_px * pm.sigma_px;
-    pm.weight = variance_px2 / (variance_px2 + own_motion_px * own_motion_px);
     pm.camera = m.camera;
     measurements_.push_back(pm);
   }

@@ -124,11 +124,11 @@ Normal accumulate(const Problem& problem, const SE3& T, std::span<const PoseMeas
     if (!m.inlier) continue;
     Whitened w;
     if (!whiten(views.of(m.camera), m, &w)) {
-      n.cost += m.weight * kLostCost;
+      n.cost += kLostCost;
       continue;
     }
-    const double squared = w.r.squaredNorm(), weight = m.weight * huber_weight(squared);
-    n.cost += m.weight * huber_cost(squared);
+    const double squared = w.r.squaredNorm(), weight = huber_weight(squared);
+    n.cost += huber_cost(squared);
     n.H.noalias() += weight * w.J.transpose() * w.J;
     n.g.noalias() += weight * w.J.transpose() * w.r;
   }

@@ -17,7 +17,6 @@ struct PoseMeasurement {
   double inverse_depth_sigma = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;
-  double weight = 1.0;  // above 0, at most 1: of its cost. Below 1 where the landmark may move by itself
   int camera = 0;
   bool inlier = true;  // in: takes part in the first round; out: chi-square below the 95 % quantile
 };
