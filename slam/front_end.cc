@@ -297,7 +297,8 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
     std::fprintf(stderr, "TRK utime %ld state %d settled %d matches %d inliers %d cm %d ci %d rms %.3f\n",
                  frame->utime, int(state_), int(validity_.refusal().reason), outcome.matches, outcome.inliers,
                  outcome.confirmed_matches, outcome.confirmed_inliers, outcome.rms);
-  standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime);
+  standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime,
+                          repeated_share_ > Validity::kFrozenShare);
 }
 
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {

@@ -17,9 +17,13 @@ class Standstill {
   // Longest run of equal images that stands for a vehicle at rest. A camera's noise ends one sooner.
   static constexpr double kLongestRepeat_s = 2.0;
 
+  // Fastest motion, seen like that, that ends between two frames: brakes stop 1 m/s at 10 m within 0.1 s.
+  static constexpr double kStoppable_rad_per_s = 0.15;
+
   // A frame with a pose. `velocity`: of the body, translation (map units a second), rotation (rad a second).
-  // `depth`: median of the landmarks, map units.
-  void note_motion(const Vector6d& velocity, double depth, std::int64_t utime);
+  // `depth`: median of the landmarks, map units. `partly_frozen`: a part of the image repeats the one
+  // before. After a faster motion than brakes can stop, such an image does not show a vehicle that stands.
+  void note_motion(const Vector6d& velocity, double depth, std::int64_t utime, bool partly_frozen);
   // A frame without a pose: whether the vehicle stands is unknown.
   void note_loss() { stands_ = false; }
 
@@ -29,6 +33,7 @@ class Standstill {
 
  private:
   bool stands_ = false;
+  double moved_rad_per_s_ = 0;
   std::int64_t seen_utime_ = 0;  // of the newest frame with a pose and an image of its own
 };
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "ipc/reason.h"
 #include "slam/frame_result.h"
 #include "tools/evaluate/own_metrics.h"
 
@@ -47,28 +48,6 @@ std::string missing_functions(std::int32_t bits) {
   for (const Name& name : kNames)
     if ((bits & name.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name.text);
   return text;
-}
-
-// Why a state gives no valid pose, in the words of the CAN signal Reason.
-const char* reason_of(int state) {
-  switch (state) {
-    case status_t::STATE_STARTING:
-      return "no image yet";
-    case status_t::STATE_INITIALISING:
-      return "map not started: it needs two views with parallax and many matches";
-    case status_t::STATE_SETTLING:
-      return "the young map's scale is settling";
-    case status_t::STATE_DEGRADED:
-      return "few landmarks";
-    case status_t::STATE_LOST:
-      return "tracking lost";
-    case status_t::STATE_RELOCALISING:
-      return "place not recognised yet";
-    case status_t::STATE_NO_CAMERA:
-      return "no camera: none answers, or it is silent";
-    default:
-      return "";
-  }
 }
 
 // Root of the trace of one 3x3 block: the size of the error; a dash where it is unknown.
@@ -183,8 +162,10 @@ std::string Board::state_lines(double now_s, bool colour) const {
 
 std::string Board::reason(double now_s) const {
   if (!status_->message.empty()) return status_->message;
-  const std::string by_state = reason_of(status_->state);
-  if (!by_state.empty()) return by_state;
+  std::array<char, ipc::kReasonText> buffer;
+  const std::string_view text = ipc::reason_text(static_cast<ipc::Reason>(status_->reason),
+                                                 status_->reason_value, status_->reason_wanted, buffer);
+  if (!text.empty()) return std::string(text);
   if (!odometry_) return "no odometry received";
   const double age_s = now_s - odometry_s_;
   return age_s > kInTime_s ? fmt::format("no pose in time: the last odometry came {:.1f} s ago", age_s) : "";
