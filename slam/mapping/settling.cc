@@ -20,7 +20,8 @@ void Settling::note_adjustment(const Soundness& soundness, std::optional<double>
   soundness_ = soundness;
   if (!scale_change) return;
   MapJudgement& j = judgement_;
-  const double gap_s = has_adjustment_ ? 1e-6 * static_cast<double>(utime - j.adjusted_utime) : 0.0;
+  const double gap_s =
+      has_adjustment_ && j.sound ? 1e-6 * static_cast<double>(utime - j.adjusted_utime) : 0.0;
   has_adjustment_ = true;
   // A rolling shutter under fast rotation, a moving scene or a wrong calibration bends the map to fit: its
   // poses are wrong, however many inliers they have.

@@ -92,7 +92,7 @@ TEST_F(InitialiserTest, AnotherPlaceBecomesTheReference) {
 }
 
 TEST_F(InitialiserTest, RenewsItsReferenceAfterTheConfiguredFrames) {
-  scene.config.initialisation.max_frames = 6;
+  scene.config.initialisation.max_age_s = 0.6;
   initialiser.emplace(scene.config, scene.rig);
   for (int i = 0; i <= 7; ++i) EXPECT_FALSE(add(aside(0.0)).has_value()) << i;
   const std::optional<InitialPair> pair = add(aside(0.8));

@@ -164,8 +164,8 @@ TEST(ConfigMistakes, UnknownKeySaysFileLineAndTheNearestKey) {
   EXPECT_EQ(error_of("traking:\n  min_inliers: 30\n"),
             "f.yaml:1: traking: unknown key, did you mean 'tracking'?");
   EXPECT_EQ(
-      error_of("tracking:\n  max_interval_frames: 3\n"),
-      "f.yaml:2: tracking.max_interval_frames: unknown key, did you mean 'keyframes.max_interval_frames'?");
+      error_of("tracking:\n  max_interval_s: 3\n"),
+      "f.yaml:2: tracking.max_interval_s: unknown key, did you mean 'keyframes.max_interval_s'?");
   EXPECT_EQ(error_of("zzzzzzzzzz: 1\n"),
             "f.yaml:1: zzzzzzzzzz: unknown key, expected a key of config/farpoint.yaml");
 }
