@@ -108,8 +108,7 @@ struct FrameIntake::CameraIntake {
 FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras) : config_(config) {
   cameras_.reserve(static_cast<std::size_t>(cameras));
   for (int c = 0; c < cameras; ++c)
-    cameras_.push_back(
-        std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)], config_));
+    cameras_.push_back(std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)], config_));
   frames_ = SharedPool<Frame>(kFrames, [&] { return full_frame(rig, cameras, config_); });
 }
 

@@ -53,7 +53,8 @@ std::string other_pixels(std::span<const std::uint8_t> png) {
   constexpr std::size_t kDepth = 24, kColour = 25;
   constexpr int kGrey = 0;
   if (png[kDepth] == 8 && png[kColour] == kGrey) return {};
-  static constexpr std::array<const char*, 7> kNames{"grey", "", "RGB", "palette", "grey and alpha", "", "RGBA"};
+  static constexpr std::array<const char*, 7> kNames{"grey",           "", "RGB", "palette",
+                                                     "grey and alpha", "", "RGBA"};
   const char* colour = png[kColour] < kNames.size() ? kNames[png[kColour]] : "unknown colour";
   return fmt::format("{}-bit {}", png[kDepth], colour);
 }
@@ -75,8 +76,7 @@ ipc::GreyImage decode(const Place& place, std::vector<std::uint8_t> bytes, int w
   message.data = std::move(bytes);
   ipc::GreyImage image;
   const ipc::ImageStatus status = ipc::ImageDecoder().decode(message, &image);
-  if (status != ipc::ImageStatus::kOk)
-    place.fail(std::string(to_string(status)) + ", expected " + kWanted);
+  if (status != ipc::ImageStatus::kOk) place.fail(std::string(to_string(status)) + ", expected " + kWanted);
   return image;
 }
 

@@ -18,7 +18,7 @@ struct RigCamera {
   std::string name;
   Camera camera;
   SE3 T_body_camera;
-  std::shared_ptr<const ImageMask> mask;  // of the camera's size; null: every pixel shows the world
+  std::shared_ptr<const ImageMask> mask = nullptr;  // of the camera's size; null: every pixel shows the world
 
   // Whether the square of half side `radius_px` around a pixel reaches into the mask.
   [[nodiscard]] bool is_masked(const Eigen::Vector2d& pixel, double radius_px) const {

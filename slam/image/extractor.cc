@@ -115,8 +115,7 @@ void Extractor::Workspace::scan(const Pyramid& pyramid, int l, const ImageMask* 
   const ImageView image = pyramid.level(l);
   const double scale = pyramid.scale(l), support_px = pyramid.support_px(l, kSupport);
   const auto masked = [&](int x, int y) {
-    return mask != nullptr &&
-           mask->touches({(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5}, support_px);
+    return mask != nullptr && mask->touches({(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5}, support_px);
   };
   // Row y is scored, then row y - 1 has both neighbours.
   bool any[3] = {};

@@ -242,7 +242,8 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
     // The template's parts have zero mean, so that the window's own mean drops out of the products.
     WindowSums product;
-    if (mask_ != nullptr && mask_->touches(((p + half) * scale - half).cast<double>(), support_px)) return result;
+    if (mask_ != nullptr && mask_->touches(((p + half) * scale - half).cast<double>(), support_px))
+      return result;
     if (!sample_window(kernels, image, p.x(), p.y(), host_template.unit, &product)) return result;
     const float energy = product.square - product.value * product.value / kCount;
     gain = product.along / host_template.norm;

@@ -56,8 +56,8 @@ MaskProposal propose(const MaskOptions& options) {
     // Without a calibration in the log nothing has held the images to one size.
     if (result.counted > 0 &&
         (image.width_px != result.last.width_px || image.height_px != result.last.height_px))
-      throw InputError(fmt::format("{}: images of CAMERA_{} of different sizes, expected one size", options.log,
-                                   options.camera));
+      throw InputError(fmt::format("{}: images of CAMERA_{} of different sizes, expected one size",
+                                   options.log, options.camera));
     ++result.seen;
     if (still->add(image)) std::swap(result.last, image);
     result.counted = still->counted();
@@ -118,8 +118,8 @@ int run_mask(const MaskOptions& options) {
   write_png(options.output, proposal, proposal.mask);
   write_png(overlay, proposal, overlay_of(proposal));
   std::printf("%s: %.1f %% of %d x %d pixels masked, by %d of %d images of CAMERA_%d; look at %s\n",
-              options.output.c_str(), 100.0 * proposal.share(), proposal.last.width_px, proposal.last.height_px,
-              proposal.counted, proposal.seen, options.camera, overlay.c_str());
+              options.output.c_str(), 100.0 * proposal.share(), proposal.last.width_px,
+              proposal.last.height_px, proposal.counted, proposal.seen, options.camera, overlay.c_str());
   return kExitDone;
 }
 
@@ -130,7 +130,8 @@ void add_mask_command(CLI::App* app, Action* action) {
   CLI::App* command =
       app->add_subcommand("mask", "Propose a camera mask from what never moves in a recording");
   command->add_option("LOG", options->log, "Recording of a vehicle that drives, with turns")->required();
-  command->add_option("-o,--output", options->output, "PNG file to write, for the key camera.mask")->required();
+  command->add_option("-o,--output", options->output, "PNG file to write, for the key camera.mask")
+      ->required();
   command->add_option("--overlay", options->overlay,
                       "Picture of the mask over an image; default: OUTPUT with .overlay.png");
   command->add_option("--camera", options->camera, "N of the channel CAMERA_N")->check(CLI::Range(0, 7));

@@ -41,7 +41,7 @@ class StillImage {
   [[nodiscard]] bool has_moved() const;
 
   int width_px_, height_px_;
-  int factor_;         // pixels of the image along a side of an averaged one
+  int factor_;          // pixels of the image along a side of an averaged one
   int columns_, rows_;  // of averaged images
   std::vector<float> averaged_;
   GradientImage here_, last_;  // of this image, of the last one counted
