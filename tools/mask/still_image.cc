@@ -23,12 +23,16 @@ constexpr float kChanged = 0.7F;
 constexpr double kMovedShare = 0.25;
 // Mean squared gradient of texture; below it a place is flat and tells nothing.
 constexpr double kFlatPower = 2.0;
-// Of the gradients' power, in still places. Still texture as strong as its noise has half.
-constexpr double kStillShare = 0.5;
+// Of the gradients' power, what agrees. Places that show a bonnet and little else have nearly all; its edge,
+// where the scene passes too, has half. Lane markings, clouds and the far end of a straight road reach 0.8 in
+// single pixels only, which is why half of a still part must be beyond.
+constexpr double kStillShare = 0.5, kCertainShare = 0.8, kCertainPart = 0.5;
 // Averaged pixels around one that are judged with it, and gaps that are closed, to either side.
 constexpr int kNeighbourhood = 2, kClosing = 2;
 // Most of a flat part's border that may be passing scene, for it to count as enclosed by still parts.
 constexpr double kMostSceneAround = 0.1;
+// A flat part of more than this many times the size of all still parts is not enclosed by them.
+constexpr std::size_t kMostFilled = 4;
 // Smaller still parts, of the image, are specks.
 constexpr double kLeastPart = 0.002;
 
@@ -41,9 +45,18 @@ Bits cells_of(const Grid<Kind>& kinds, Kind kind) {
   return bits;
 }
 
-// Flat parts between still ones, and the image's edge, become still.
+// Still places outside `kept` pass.
+void keep(const Bits& kept, Grid<Kind>* kinds) {
+  for (std::size_t i = 0; i < kinds->cells.size(); ++i)
+    if (kinds->cells[i] == Kind::kStill && kept.cells[i] == 0) kinds->cells[i] = Kind::kPassing;
+}
+
+// Flat parts between still ones, and the image's edge, become still. A part larger than all still ones is
+// none that they enclose: it is the sky above a horizon that keeps its height.
 void fill_enclosed(Grid<Kind>* kinds) {
-  for_each_component(cells_of(*kinds, Kind::kFlat), [kinds](const std::vector<std::size_t>& part) {
+  const auto all_still =
+      static_cast<std::size_t>(std::count(kinds->cells.begin(), kinds->cells.end(), Kind::kStill));
+  for_each_component(cells_of(*kinds, Kind::kFlat), [kinds, all_still](const std::vector<std::size_t>& part) {
     int still = 0, passing = 0;
     for (const std::size_t cell : part) {
       const int x = static_cast<int>(cell % static_cast<std::size_t>(kinds->columns)),
@@ -55,16 +68,21 @@ void fill_enclosed(Grid<Kind>* kinds) {
         passing += kinds->at(u, v) == Kind::kPassing ? 1 : 0;
       }
     }
-    if (still == 0 || passing > kMostSceneAround * (still + passing)) return;
+    if (still == 0 || part.size() > kMostFilled * all_still || passing > kMostSceneAround * (still + passing))
+      return;
     for (const std::size_t cell : part) kinds->cells[cell] = Kind::kStill;
   });
 }
 
-Bits without_specks(const Bits& bits) {
-  Bits kept(bits.columns, bits.rows);
-  const double least = kLeastPart * static_cast<double>(bits.cells.size());
-  for_each_component(bits, [&](const std::vector<std::size_t>& part) {
-    if (static_cast<double>(part.size()) < least) return;
+// Keeps the parts that are large enough and of which enough is certain.
+Bits sound_parts(const Bits& still, const Bits& certain) {
+  Bits kept(still.columns, still.rows);
+  const double least = kLeastPart * static_cast<double>(still.cells.size());
+  for_each_component(still, [&](const std::vector<std::size_t>& part) {
+    const auto sure = static_cast<double>(
+        std::count_if(part.begin(), part.end(), [&](std::size_t cell) { return certain.cells[cell] != 0; }));
+    const auto size = static_cast<double>(part.size());
+    if (size < least || sure < kCertainPart * size) return;
     for (const std::size_t cell : part) kept.cells[cell] = 1;
   });
   return kept;
@@ -152,15 +170,21 @@ std::vector<std::uint8_t> StillImage::propose() const {
   }
   const Grid<double> sums = box_sums(of_sum, kNeighbourhood), all = box_sums(of_all, kNeighbourhood),
                      areas = box_sums(Grid<double>(columns_, rows_, 1.0), kNeighbourhood);
-  Grid<Kind> kinds(columns_, rows_, Kind::kFlat);
+  Grid<Kind> kinds(columns_, rows_, Kind::kPassing);
+  Bits certain(columns_, rows_);
   for (std::size_t i = 0; i < kinds.cells.size(); ++i) {
-    if (all.cells[i] < kFlatPower * areas.cells[i] * counted_) continue;
-    const bool still = sums.cells[i] > kStillShare * counted_ * all.cells[i];
-    kinds.cells[i] = still ? Kind::kStill : Kind::kPassing;
+    const double agreeing = sums.cells[i] / (counted_ * std::max(all.cells[i], 1e-9));
+    const bool flat = all.cells[i] < kFlatPower * areas.cells[i] * counted_;
+    if (flat)
+      kinds.cells[i] = Kind::kFlat;
+    else if (agreeing > kStillShare)
+      kinds.cells[i] = Kind::kStill;
+    certain.cells[i] = !flat && agreeing > kCertainShare ? 1 : 0;
   }
+  keep(sound_parts(cells_of(kinds, Kind::kStill), certain), &kinds);
   fill_enclosed(&kinds);
   // One more to each side: a still edge lies anywhere in its averaged pixel.
-  const Bits still = dilated(without_specks(closed(cells_of(kinds, Kind::kStill), kClosing)), 1);
+  const Bits still = dilated(closed(cells_of(kinds, Kind::kStill), kClosing), 1);
   std::vector<std::uint8_t> mask;
   mask.reserve(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_));
   for (int y = 0; y < height_px_; ++y)

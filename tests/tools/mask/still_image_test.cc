@@ -15,14 +15,15 @@ namespace {
 
 constexpr int kWidth = 640, kHeight = 400;
 
-// Waves that move with the offset, and a flat sky above them.
+// Waves that move with the offset, and a flat sky above a skyline that moves with them.
 ipc::GreyImage scene(double offset_px) {
   ipc::GreyImage image{kWidth, kHeight, {}};
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const double u = x + offset_px * (0.5 + 0.002 * y), v = y + 0.7 * offset_px;
       const double wave = 30 * std::sin(u / 7) * std::cos(v / 9) + 30 * std::sin(u / 23 + v / 17);
-      image.pixels.push_back(static_cast<std::uint8_t>(y < 120 ? 240 : std::lround(128 + wave)));
+      image.pixels.push_back(
+          static_cast<std::uint8_t>(y < 120 + 12 * std::sin(u / 31) ? 240 : std::lround(128 + wave)));
     }
   return image;
 }
@@ -68,6 +69,17 @@ TEST(StillImage, AFlatSkyIsNotStill) {
   for (int i = 0; i < 60; ++i) still.add(scene(11.0 * i + 0.03 * i * i));
   EXPECT_GE(still.counted(), StillImage::kLeastImages);
   EXPECT_EQ(masked_share(still.propose()), 0.0);
+}
+
+// A level horizon that keeps its height encloses nothing.
+TEST(StillImage, ASkyAboveAStillEdgeIsNotStill) {
+  StillImage still(kWidth, kHeight);
+  for (int i = 0; i < 60; ++i) {
+    ipc::GreyImage image = scene(11.0 * i + 0.03 * i * i);
+    std::fill_n(image.pixels.begin(), kWidth * 140, std::uint8_t{240});
+    still.add(image);
+  }
+  EXPECT_LT(masked_share(still.propose()), 0.1);
 }
 
 TEST(StillImage, AFlatPartThatStillOnesEncloseIsStill) {
