@@ -21,7 +21,7 @@ constexpr float kChanged = 0.7F;
 // Share of the textured pixels that must have changed for the image to have moved. Passing cars change less
 // of it while the vehicle stands; the bonnet may take three quarters.
 constexpr double kMovedShare = 0.25;
-// Mean squared gradient of texture; below it a place is flat and tells nothing.
+// Mean squared gradient of texture; below it a place is flat, neither still nor passing.
 constexpr double kFlatPower = 2.0;
 // Of the gradients' power, what agrees. Places that show a bonnet and little else have nearly all; its edge,
 // where the scene passes too, has half. Lane markings, clouds and the far end of a straight road reach 0.8 in
