@@ -82,6 +82,21 @@ TEST(StillImage, ASkyAboveAStillEdgeIsNotStill) {
   EXPECT_LT(masked_share(still.propose()), 0.1);
 }
 
+// A guard rail of a straight road keeps its place, except that the vehicle pitches and rolls a little.
+TEST(StillImage, WhatStaysNearlyInItsPlaceIsNotStill) {
+  StillImage still(kWidth, kHeight);
+  for (int i = 0; i < 60; ++i) {
+    ipc::GreyImage image = scene(11.0 * i + 0.03 * i * i);
+    const int shake = static_cast<int>(std::lround(3.5 * std::sin(2.1 * i)));
+    for (int y = 300 + shake; y < 324 + shake; ++y)
+      std::fill_n(image.pixels.begin() + y * kWidth, kWidth,
+                  static_cast<std::uint8_t>((y - shake) / 12 % 2 * 180));
+    still.add(image);
+  }
+  EXPECT_GE(still.counted(), StillImage::kLeastImages);
+  EXPECT_EQ(masked_share(still.propose()), 0.0);
+}
+
 TEST(StillImage, AFlatPartThatStillOnesEncloseIsStill) {
   StillImage still(kWidth, kHeight);
   // A frame of stripes around a flat middle, at the lower edge.
