@@ -27,7 +27,7 @@ class RecordedMask : public testing::Test {
   void SetUp() override {
     if (!fs::exists(kData / "kitti")) GTEST_SKIP() << "no recording " << (kData / "kitti");
     ASSERT_TRUE(import_recording("kitti {}/kitti 03", plain_));
-    (void)paint_bonnet(plain_, painted_, {.noise = 3});
+    (void)paint_bonnet(plain_, painted_, {.noise = 4});
   }
   // Size from the first image, pixels of the PNG file.
   static ipc::GreyImage read_png(const std::string& path) {
@@ -64,18 +64,17 @@ TEST_F(RecordedMask, TheProposedMaskCoversTheBonnetAndMakesItIrrelevant) {
   }
   EXPECT_GT(both / either, 0.9);
   EXPECT_LT(beside / scene, 0.04);
-  // Bounds are the run's without the bonnet, from the same scene with the same mask; see tests/FINDINGS.md.
+  // 1.3 times the run's own figure (tests/FINDINGS.md); without a bonnet and without a mask it is 0.22 m.
   const std::string out = work_.path("run.lcm");
   ASSERT_EQ(run((kBin / "farpointd").string() + " --replay " + painted_ + " --lockstep --output " + out +
                 " --set camera.mask=" + mask_),
             0);
   EXPECT_EQ(run((kBin / "farpoint").string() + " evaluate " + out + " --truth " + plain_ +
-                " --expect 'run.live.share >= 0.95' --expect 'run.final.ate_rmse_m <= 1.0'"),
+                " --expect 'run.live.share >= 0.95' --expect 'run.final.ate_rmse_m <= 0.35'"),
             0);
 }
 
 TEST_F(RecordedMask, WithTheMaskTheBonnetChangesNoByte) {
-  std::ofstream(mask_, std::ios::binary).close();
   const ipc::GreyImage size = [&] {
     ipc::LogReader reader(painted_);
     ipc::LogEvent event;
