@@ -112,7 +112,7 @@ struct CanConfig {
 struct MavlinkConfig {
   bool enabled = false;
   std::string link = "udp:127.0.0.1:14580";  // udp:ADDRESS:PORT or serial:DEVICE:BAUD
-  double rate_hz = 30;                        // ODOMETRY messages a second
+  double rate_hz = 30;                       // ODOMETRY messages a second
   int system_id = 1, component_id = 197;
 };
 

@@ -160,8 +160,8 @@ void MavlinkLink::close() {
   fd_ = -1;
 }
 
-// A UDP port without a listener is an error of the next call only: the socket stays. A serial device that is gone has
-// to be opened anew.
+// A UDP port without a listener is an error of the next call only: the socket stays. A serial device that is
+// gone has to be opened anew.
 void MavlinkLink::note_failure(int error) {
   counts_.last_errno = error;
   if (address_.is_serial && error != EAGAIN && error != EINTR) close();

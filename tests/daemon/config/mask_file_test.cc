@@ -100,9 +100,8 @@ TEST(MaskedReplay, AMaskOfAnotherSizeStopsTheStartWithStatusTwoAndOneLine) {
   const test::Scratch scratch;
   test::write_synthetic_log(scratch.path("run.lcm"), {.frames = 3});
   put(scratch.path("mask.png"), png(64, 48, 5));
-  const test::Outcome outcome =
-      test::run_daemon({"--replay", scratch.path("run.lcm"), "--lockstep", "--set",
-                        "camera.mask=" + scratch.path("mask.png")});
+  const test::Outcome outcome = test::run_daemon({"--replay", scratch.path("run.lcm"), "--lockstep", "--set",
+                                                  "camera.mask=" + scratch.path("mask.png")});
   EXPECT_EQ(outcome.status, 2);
   EXPECT_EQ(outcome.err, "farpointd: configuration: camera.mask: " + scratch.path("mask.png") +
                              ": 64 x 48 pixels, expected the camera's 480 x 320\n");
@@ -115,9 +114,9 @@ TEST(MaskedReplay, NoOutputDependsOnMaskedPixels) {
   test::paint_bonnet(scratch.path("plain.lcm"), scratch.path("painted.lcm"), {.noise = 4});
   put(scratch.path("mask.png"), ipc::encode_png({480, 320, test::Bonnet(480, 320, {}).mask()}));
   const auto live_trajectory = [&](const std::string& log, const std::string& mask) {
-    const test::Outcome outcome = test::run_daemon(
-        {"--replay", scratch.path(log + ".lcm"), "--lockstep", "--live-trajectory", scratch.path("live.tum"),
-         "--set", "camera.mask=" + mask});
+    const test::Outcome outcome =
+        test::run_daemon({"--replay", scratch.path(log + ".lcm"), "--lockstep", "--live-trajectory",
+                          scratch.path("live.tum"), "--set", "camera.mask=" + mask});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return test::text_of(scratch.path("live.tum"));
   };
