@@ -74,8 +74,10 @@ std::uint64_t pixel_hash(const ImageView& image) {
 
 // A pyramid behind the interface of a frame's image.
 struct FrameIntake::PyramidBuffer final : FrameImage {
-  PyramidBuffer(int width_px, int height_px, const PyramidOptions& options)
-      : pyramid(width_px, height_px, options), image(&pyramid) {}
+  PyramidBuffer(const RigCamera& of, const PyramidOptions& options)
+      : mask(of.mask),
+        pyramid(of.camera.width_px(), of.camera.height_px(), options),
+        image(&pyramid, mask.get()) {}
   [[nodiscard]] bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const override {
     return image.extract_patch(set, index, patch);
   }
@@ -83,19 +85,21 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
                                 const Eigen::Vector2f& predicted_px, float max_shift_px) const override {
     return image.align(host, A, predicted_px, max_shift_px);
   }
+  std::shared_ptr<const ImageMask> mask;
   Pyramid pyramid;
   PyramidImage image;
 };
 
 struct FrameIntake::CameraIntake {
-  CameraIntake(const Camera& model, const EstimatorConfig& config)
-      : camera(model),
-        extractor(model.width_px(), model.height_px(), config.pyramid, config.extractor),
-        pyramids(pyramid_count(config), [&model, &config] {
-          return std::make_shared<PyramidBuffer>(model.width_px(), model.height_px(), config.pyramid);
-        }) {}
+  CameraIntake(const RigCamera& of, const EstimatorConfig& config)
+      : camera(of.camera),
+        mask(of.mask),
+        extractor(camera.width_px(), camera.height_px(), config.pyramid, config.extractor),
+        pyramids(pyramid_count(config),
+                 [&of, &config] { return std::make_shared<PyramidBuffer>(of, config.pyramid); }) {}
 
   Camera camera;
+  std::shared_ptr<const ImageMask> mask;  // null: none
   Extractor extractor;
   SharedPool<PyramidBuffer> pyramids;
   std::uint64_t image_hash = 0;  // of the last image
@@ -104,8 +108,7 @@ struct FrameIntake::CameraIntake {
 FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras) : config_(config) {
   cameras_.reserve(static_cast<std::size_t>(cameras));
   for (int c = 0; c < cameras; ++c)
-    cameras_.push_back(
-        std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)].camera, config_));
+    cameras_.push_back(std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)], config_));
   frames_ = SharedPool<Frame>(kFrames, [&] { return full_frame(rig, cameras, config_); });
 }
 
@@ -171,7 +174,7 @@ bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* 
     pixels->pyramid.build(input.image);
   }
   const StageSpan span(listener_, Stage::kExtraction);
-  camera.extractor.extract(pixels->pyramid, {}, &view.set, most_features);
+  camera.extractor.extract(pixels->pyramid, camera.mask.get(), &view.set, most_features);
   view.image = pixels;
   view.grid.build(view.set.features);
   return true;
@@ -201,9 +204,15 @@ std::vector<std::pair<std::string, std::size_t>> FrameIntake::memory_table() con
     frame_bytes += view.set.features.capacity() * sizeof(Feature) +
                    view.set.descriptors.capacity() * sizeof(Descriptor) + view.grid.bytes();
   }
-  for (const auto& camera : cameras_)
+  std::size_t mask_bytes = 0;
+  for (const auto& camera : cameras_) {
     pyramid_bytes += camera->pyramids.capacity() * camera->pyramids.sample().pyramid.bytes();
-  return {{"pyramids", pyramid_bytes}, {"frames", frames_.capacity() * frame_bytes}};
+    if (camera->mask) mask_bytes += camera->mask->bytes();
+  }
+  std::vector<std::pair<std::string, std::size_t>> table{{"pyramids", pyramid_bytes},
+                                                         {"frames", frames_.capacity() * frame_bytes}};
+  if (mask_bytes > 0) table.emplace_back("masks", mask_bytes);
+  return table;
 }
 
 }  // namespace farpoint::slam

@@ -8,8 +8,8 @@
 
 #include "slam/geometry/se3.h"
 #include "slam/image/extractor.h"
+#include "slam/map/refusal.h"
 #include "slam/mapping/counts.h"
-#include "slam/refusal.h"
 
 namespace farpoint::slam {
 

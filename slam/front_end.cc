@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <optional>
 
 namespace farpoint::slam {
@@ -293,10 +291,6 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   fill_pose(outcome.T_world_body, outcome.covariance);
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
   last_outcome_ = outcome;
-  if (std::getenv("SND") != nullptr)
-    std::fprintf(stderr, "TRK utime %ld state %d settled %d matches %d inliers %d cm %d ci %d rms %.3f\n",
-                 frame->utime, int(state_), int(validity_.refusal().reason), outcome.matches, outcome.inliers,
-                 outcome.confirmed_matches, outcome.confirmed_inliers, outcome.rms);
   standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime,
                           repeated_share_ > Validity::kFrozenShare);
 }

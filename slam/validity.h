@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "slam/map/map_judgement.h"
-#include "slam/refusal.h"
+#include "slam/map/refusal.h"
 #include "slam/tracking/track_outcome.h"
 
 namespace farpoint::slam {
@@ -15,7 +15,7 @@ class Validity {
   // Inliers among the landmarks of known depth: rigid scenes show 0.7 and more. Below the first a valid pose
   // is doubted, above the second an invalid one may become valid.
   static constexpr double kDoubtedShare = 0.55, kAgreedShare = 0.65;
-  // Landmarks of known depth below which a share tells nothing.
+  // Fewest landmarks of known depth that hold a pose.
   static constexpr int kLeastKnown = 12;
   // A doubt lasts for so long before the pose is called invalid: one frame of a passing bus is none.
   static constexpr double kDoubt_s = 0.3;

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "daemon/config/yaml_file.h"
+#include "drivers/mavlink/mavlink_link.h"
 #include "ipc/can_frame.h"
 #include "ipc/printable.h"
 
@@ -292,6 +293,12 @@ void check_can(const CanConfig& can, const ConfigOrigins& origins) {
   }
 }
 
+void check_mavlink(const MavlinkConfig& mavlink, const ConfigOrigins& origins) {
+  const std::string problem = drivers::MavlinkAddress::check(mavlink.link);
+  if (!problem.empty())
+    fail(place_of("mavlink.link", origins), "mavlink.link: " + quote(mavlink.link) + ", " + problem);
+}
+
 }  // namespace
 
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins,
@@ -370,6 +377,7 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   require_not_above("camera.exposure_short_us", "camera.exposure_max_us");
   check_second_camera(config.camera, origins);
   check_can(config.can, origins);
+  check_mavlink(config.mavlink, origins);
   require_not_above("mapping.quick_view_delay_ms", "mapping.full_view_delay_ms");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");

@@ -97,6 +97,8 @@ std::vector<ConfigKey> make_keys() {
       integer("record.waiting_images", "images", 2, 300, FIELD(record.waiting_images)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
+      text("camera.mask", FIELD(camera.mask)),
+      text("camera.second_mask", FIELD(camera.second_mask)),
       enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
@@ -139,6 +141,12 @@ std::vector<ConfigKey> make_keys() {
       text("can.messages", FIELD(can.messages)),
       text("can.wheels_dbc", FIELD(can.wheels_dbc)),
       text("can.wheel_signals", FIELD(can.wheel_signals)),
+
+      boolean("mavlink.enabled", FIELD(mavlink.enabled)),
+      text("mavlink.link", FIELD(mavlink.link)),
+      number("mavlink.rate_hz", "Hz", 1, 100, FIELD(mavlink.rate_hz)),
+      integer("mavlink.system_id", "", 1, 255, FIELD(mavlink.system_id)),
+      integer("mavlink.component_id", "", 1, 255, FIELD(mavlink.component_id)),
 
       boolean("realtime.lock_memory", FIELD(realtime.lock_memory)),
       integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),

@@ -187,6 +187,12 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.can_received = out.can_received;
   s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
+  s.mavlink_sent = out.mavlink_sent;
+  s.mavlink_without_scale = out.mavlink_without_scale;
+  s.mavlink_without_pose = out.mavlink_without_pose;
+  s.mavlink_send_errors = out.mavlink_send_errors;
+  s.mavlink_received = out.mavlink_received;
+  s.mavlink_round_trip_us = out.mavlink_round_trip_us;
   s.images_not_recorded = in.not_recorded;
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors()) + out.can_not_logged;
   s.side_missing = out.side_missing;

@@ -111,6 +111,9 @@ void smooth_weights(float t, float out[5]) {
   out[4] = kBlurSide * w[2];
 }
 
+// Pixels to either side of its centre that a window reads: half its side, the rounding, the spline and blur.
+constexpr double kWindowSupport = 6.0;
+
 // Sums of the image around (x, y), at the offsets of the template. False if it leaves the image.
 bool sample_window(const Kernels& kernels, const ImageView& image, float x, float y,
                    const PatchTemplate& with, WindowSums* out) {
@@ -203,6 +206,8 @@ bool PyramidImage::extract_patch(const FeatureSet& set, std::size_t index, Patch
   const int y0 = nearest_pixel((f.v_px + 0.5F) / scale - 0.5F) - Patch::kCentre;
   if (x0 < 0 || y0 < 0 || x0 + Patch::kSize > image.width_px || y0 + Patch::kSize > image.height_px)
     return false;
+  if (mask_ != nullptr && mask_->touches({f.u_px, f.v_px}, pyramid_->support_px(f.level, Patch::kCentre)))
+    return false;
   for (int y = 0; y < Patch::kSize; ++y) {
     std::copy_n(image.data + static_cast<std::ptrdiff_t>(y0 + y) * image.stride_bytes + x0, Patch::kSize,
                 patch->pixels.data() + y * Patch::kSize);
@@ -228,6 +233,7 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   if (!warp_template(kernels, host, B, &host_template.unit) || !normalise(&host_template)) return result;
 
   const ImageView image = pyramid_->level(level);
+  const double support_px = pyramid_->support_px(level, kWindowSupport);
   const Eigen::Vector2f half(0.5F, 0.5F);
   const Eigen::Vector2f start = (predicted_px + half) / scale - half;
   Eigen::Vector2f p = start;
@@ -236,6 +242,8 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
     // The template's parts have zero mean, so that the window's own mean drops out of the products.
     WindowSums product;
+    if (mask_ != nullptr && mask_->touches(((p + half) * scale - half).cast<double>(), support_px))
+      return result;
     if (!sample_window(kernels, image, p.x(), p.y(), host_template.unit, &product)) return result;
     const float energy = product.square - product.value * product.value / kCount;
     gain = product.along / host_template.norm;

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "slam/refusal.h"
+#include "slam/map/refusal.h"
 
 namespace farpoint::slam {
 

@@ -4,8 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 namespace farpoint::slam {
@@ -149,9 +147,6 @@ Soundness soundness_of(const BundleProblem& problem) {
   s.noise_px = std::sqrt(variance_px2 / weight / kInlierVariance);
   s.field_px = std::sqrt(std::max(field_px2 / fields, 0.0));
   s.excess = residuals.chi2 / residuals.weight / (2.0 * noise2);
-  if (std::getenv("SND"))
-    std::fprintf(stderr, "SND n %d field_px %.4f excess %.3f noise %.3f noise_px %.3f chi2 %.3f\n", fields,
-                 s.field_px, s.excess, s.noise_sigmas, s.noise_px, s.mean_chi2);
   return s;
 }
 

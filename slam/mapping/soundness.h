@@ -4,7 +4,7 @@
 // a scene that moves.
 #pragma once
 
-#include "slam/refusal.h"
+#include "slam/map/refusal.h"
 #include "slam/solver/bundle_problem.h"
 
 namespace farpoint::slam {

@@ -12,8 +12,8 @@
 
 #include "slam/config.h"
 #include "slam/geometry/two_view.h"
+#include "slam/map/refusal.h"
 #include "slam/map/request.h"
-#include "slam/refusal.h"
 
 namespace farpoint::slam {
 

@@ -12,7 +12,7 @@ namespace farpoint::slam {
 
 namespace {
 
-constexpr double kBorderPx = 4.0;
+constexpr double kBorderPx = 4.0;  // of the image, and of its mask
 // Sigmas of a landmark's depth that the search window takes in, and the most that they widen it.
 constexpr double kDepthSigmas = 2.0, kMostDepthPx = 20.0;
 // How far alignment may move from the corner, pixels of the corner's level.
@@ -83,7 +83,7 @@ void Matcher::project_into(int index, const SE3& T_world_body, LandmarkSubset su
     if (!in_subset(i, subset)) continue;
     const ViewLandmark& l = view_->landmarks[i];
     if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &c.prediction)) continue;
-    if (!is_matchable(c.prediction)) continue;
+    if (!is_matchable(c.prediction) || rig_camera.is_masked(c.prediction.pixel, kBorderPx)) continue;
     c.view_index = static_cast<std::uint32_t>(i);
     c.level = predicted_level(l.host_level, c.prediction.scale_change,
                               static_cast<float>(pyramid_.scale_factor), pyramid_.levels);

@@ -89,6 +89,27 @@ TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
       has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone   skew -1.2 ms\n"));
 }
 
+TEST(Top, MavlinkIsShownWhereItRuns) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  s.mavlink_round_trip_us = -1;
+  board.take(s, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "MAVLink"));
+  s.mavlink_without_scale = 60;
+  s.side_missing = int{status_t::SIDE_MAVLINK};
+  board.take(s, 100.2);
+  const std::string held = board.render(100.3, false);
+  EXPECT_TRUE(has(held, "MAVLink   0 sent   60 without metres   0 without pose   0 errors   no answer\n"))
+      << held;
+  EXPECT_TRUE(has(held, "missing   MAVLink   0 attempts failed\n")) << held;
+  s.mavlink_sent = 900;
+  s.mavlink_round_trip_us = 1234;
+  board.take(s, 100.4);
+  EXPECT_TRUE(has(board.render(100.5, false),
+                  "MAVLink   900 sent   60 without metres   0 without pose   0 errors   "
+                  "round trip 1234 us\n"));
+}
+
 TEST(Top, FunctionsThatHaveNotBegunAreNamed) {
   Board board;
   status_t s = status_of(status_t::STATE_TRACKING);

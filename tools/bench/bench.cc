@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "daemon/config/mask_file.h"
 #include "daemon/config/rig.h"
 #include "daemon/input/log_frame_source.h"
 #include "daemon/system/solver_loader.h"
@@ -57,8 +58,9 @@ BenchPass run_pass(const BenchOptions& options, const daemon::Config& config,
     const double began_s = daemon::process_cpu_s();
     if (!source.next(&frame, &clock)) break;
     if (!estimator) {
-      estimator = std::make_unique<slam::Estimator>(
-          config.estimator, daemon::make_rig(source.calibration(), config.camera.index));
+      slam::Rig rig = daemon::make_rig(source.calibration(), config.camera.index);
+      daemon::read_masks(config.camera, source.calibration(), &rig);
+      estimator = std::make_unique<slam::Estimator>(config.estimator, rig);
       estimator->listen(&clock);
     }
     const slam::ImageView view{frame.image->data(), frame.image->width_px, frame.image->height_px,

@@ -20,6 +20,7 @@ void add_top_command(CLI::App* app, Action* action);
 void add_report_command(CLI::App* app, Action* action);
 void add_spy_command(CLI::App* app, Action* action);
 void add_simulate_command(CLI::App* app, Action* action);
+void add_mask_command(CLI::App* app, Action* action);
 
 // The whole program: parses, runs, and reports every failure by one line on standard error and an exit
 // status.

@@ -72,6 +72,7 @@ int run_farpoint(int argc, const char* const* argv) {
   add_spy_command(&app, &action);
   add_report_command(&app, &action);
   add_simulate_command(&app, &action);
+  add_mask_command(&app, &action);
   const std::string unknown = unknown_words(app, argc, argv);
   if (!unknown.empty()) return report(unknown, kExitMisused);
   try {

@@ -43,7 +43,8 @@ std::string missing_functions(std::int32_t bits) {
                                  Name{status_t::SIDE_LIVE_TRAJECTORY, "trajectory"},
                                  Name{status_t::SIDE_CAN_LOG, "CAN log"},
                                  Name{status_t::SIDE_RECORDING, "recording"},
-                                 Name{status_t::SIDE_LOG_FILE, "log file"}};
+                                 Name{status_t::SIDE_LOG_FILE, "log file"},
+                                 Name{status_t::SIDE_MAVLINK, "MAVLink"}};
   std::string text;
   for (const Name& name : kNames)
     if ((bits & name.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name.text);
@@ -257,6 +258,13 @@ std::string Board::fault_lines() const {
   if (bus != "off")
     text += fmt::format("   {} not sent   {} bus-offs   {} received", s.can_send_errors, s.can_bus_offs,
                         s.can_received);
+  if (s.mavlink_sent + s.mavlink_without_scale + s.mavlink_without_pose > 0) {
+    const std::string answered =
+        s.mavlink_round_trip_us < 0 ? "no answer" : fmt::format("round trip {} us", s.mavlink_round_trip_us);
+    text += fmt::format("\nMAVLink   {} sent   {} without metres   {} without pose   {} errors   {}",
+                        s.mavlink_sent, s.mavlink_without_scale, s.mavlink_without_pose,
+                        s.mavlink_send_errors, answered);
+  }
   text += fmt::format(
       "\nerrors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
       s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);
