@@ -3,7 +3,7 @@
 """usage: alone_test.py BUILD_FOLDER SOURCE_FOLDER CPACK
 
 The .deb on a machine that has what it depends on and no clone: installed by dpkg it simulates, replays and reports; an
-upgrade keeps a changed configuration; removal keeps all of it; purge leaves nothing. The machine is a
+upgrade keeps a changed configuration; removal keeps all of it; purge keeps what is not the package's. The machine is a
 copy-on-write view of this one. tests/systemd/bare_test.py does the same on a bare Debian. Status 77 where it cannot run.
 """
 
@@ -89,13 +89,18 @@ def check_removal(machine):
 
 
 def check_purge(machine):
-    machine.do("dpkg", "-P", "farpoint")
-    for name in (*USERS, *DAEMONS, CONFIGURATION):
+    said = machine.do("dpkg", "-P", "farpoint")
+    expect_users_files(machine, "the purge")
+    for name in (*DAEMONS, CONFIGURATION):
         expect(not machine.holds(name), f"the purge left {name}")
+    for folder in ("/etc/farpoint", "/var/lib/farpoint", "/var/log/farpoint"):
+        expect(f"{folder} holds files" in said, f"the purge does not name {folder}, which stays")
 
 
 def check_clean_purge(machine):
     """Where all files are the package's own, none stay."""
+    for name in USERS:
+        machine.path(name).unlink()
     listing = machine.do("dpkg-deb", "--contents", "/tmp/farpoint.deb").splitlines()
     files = [line.split(" ./", 1)[1].split(" -> ")[0] for line in listing]
     machine.do(*INSTALL, "/tmp/farpoint.deb")
