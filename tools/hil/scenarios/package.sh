@@ -26,6 +26,7 @@ dpkg -r farpoint > /tmp/dpkg.log 2>&1 || fail "removal: $(tail -1 /tmp/dpkg.log)
 ! has_lcm_route || fail "the removal left LCM's route"
 grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the removal took the configuration"
 [ -e /etc/farpoint/camera.yaml ] || fail "the removal took the camera file"
+[ -s /var/lib/farpoint/boot_counter ] || fail "the removal took the boot counter"
 dpkg -P farpoint > /tmp/dpkg.log 2>&1 || fail "purge: $(tail -1 /tmp/dpkg.log)"
 [ -e /etc/farpoint/camera.yaml ] || fail "the purge took the camera file"
 for gone in /etc/farpoint/farpoint.yaml /var/lib/farpoint/boot_counter; do
