@@ -81,9 +81,10 @@ void check_cores(const RealtimeConfig& wanted, const std::vector<Core>& cores, c
 
 void check_locked_memory(const RealtimeConfig& config, std::uint64_t most_bytes, const Judged& judged) {
   const std::string what = "locked memory";
-  constexpr std::uint64_t kMega = 1'000'000;
+  constexpr std::uint64_t kMega = 1'000'000, kEnough = 2000 * kMega;  // MemoryMax= of the unit
   if (!config.lock_memory) return judged.findings->ok(what, "not asked for (realtime.lock_memory)");
   if (most_bytes == Privileges::kUnlimited) return judged.findings->ok(what, "without a limit");
+  if (most_bytes >= kEnough) return judged.findings->ok(what, fmt::format("up to {} MB", most_bytes / kMega));
   judged.lacks(what,
                fmt::format("this account may lock {} MB, expected no limit: LimitMEMLOCK=infinity in the "
                            "unit, memlock in /etc/security/limits.d, or CAP_IPC_LOCK",
