@@ -165,8 +165,9 @@ void collect_hardware(Collection* collection) {
 std::string head_of_list() {
   return "farpoint bugreport of " + utc("%Y-%m-%d %H:%M:%S") +
          " UTC\n\n"
-         "No images, recordings, maps, keys or passwords are looked for, and nothing is taken out of what is "
-         "taken.\n"
+         "No images, recordings, maps, keys or passwords are looked for. Each file is as its source is, or "
+         "begins "
+         "with\na line that counts what was left out before it.\n"
          "The files hold what was configured and logged: names of this computer and its accounts, paths, "
          "serial\n"
          "numbers in names of devices. Read them before you send them.\n";

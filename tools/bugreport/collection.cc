@@ -88,12 +88,12 @@ void Collection::add_output(const std::string& name, std::vector<std::string> co
     while (const std::size_t got = child.read(block)) tail.add({block.data(), got});
     const int status = child.wait();
     std::string text = tail.take();
-    if (!text.empty()) return add_text(name, shown, std::move(text));
+    const std::string ended = status == 0 ? "" : fmt::format(" (status {}) {}", status, child.complaint());
+    if (text.empty() && status == 0) text = "nothing is printed\n";
+    if (!text.empty()) return add_text(name, shown + ended, std::move(text));
     constexpr int kNotFound = 127;
-    const std::string why = status == kNotFound         ? "is not installed, expected the package " + package
-                            : child.complaint().empty() ? fmt::format("printed nothing (status {})", status)
-                                                        : child.complaint();
-    add_missing(name, shown + ": " + why);
+    add_missing(name, shown + (status == kNotFound ? ": is not installed, expected the package " + package
+                                                   : ":" + ended));
   } catch (const std::runtime_error& error) {
     add_missing(name, shown + ": " + error.what());
   }

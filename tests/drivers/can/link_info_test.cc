@@ -79,12 +79,19 @@ TEST(LinkInfo, ACutOrDamagedAnswerIsReadWithinItsBounds) {
   }
 }
 
+LinkInfo link_of(std::uint32_t txqueuelen, const std::string& queue) {
+  LinkInfo link;
+  link.txqueuelen = txqueuelen;
+  link.queue = queue;
+  return link;
+}
+
 TEST(LinkInfo, AQueueThatDoesNotFitAnEpochIsSaid) {
-  EXPECT_EQ(queue_problem({10, "pfifo_fast"}, 9), "");
-  EXPECT_EQ(queue_problem({0, "noqueue"}, 9), "");  // vcan
-  EXPECT_NE(queue_problem({8, "pfifo_fast"}, 9).find("holds 8 frames, expected room for the 9"),
+  EXPECT_EQ(queue_problem(link_of(10, "pfifo_fast"), 9), "");
+  EXPECT_EQ(queue_problem(link_of(0, "noqueue"), 9), "");  // vcan
+  EXPECT_NE(queue_problem(link_of(8, "pfifo_fast"), 9).find("holds 8 frames, expected room for the 9"),
             std::string::npos);
-  EXPECT_NE(queue_problem({1000, "fq_codel"}, 9).find("is fq_codel, which may drop or reorder"),
+  EXPECT_NE(queue_problem(link_of(1000, "fq_codel"), 9).find("is fq_codel, which may drop or reorder"),
             std::string::npos);
 }
 
