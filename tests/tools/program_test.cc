@@ -64,7 +64,7 @@ TEST(Program, VersionNamesTheBuildOfBothPrograms) {
 
 TEST(Program, WrongUseNamesTheCommandWhoseHelpExplainsIt) {
   expect_misuse("--nonsense", "(see farpoint --help)");
-  expect_misuse("evaluate --nonsense", "--nonsense (see farpoint evaluate --help)");
+  expect_misuse("evaluate x.tum --nonsense", "--nonsense (see farpoint evaluate --help)");
   expect_misuse("import bag x.bag --nonsense", "--nonsense (see farpoint import bag --help)");
   expect_misuse("import bag", "(see farpoint import bag --help)");
 }
