@@ -40,7 +40,7 @@ void add_bugreport_command(CLI::App* app, Action* action) {
       "interfaces.\n"
       "No images, recordings or maps. contents.txt in the archive lists what was taken and what could not be "
       "read\n"
-      "and why; nothing is taken out of a file. Root is not needed; the journal needs root, or group adm.\n"
+      "and why. Root is not needed; the journal needs root, or group adm.\n"
       "Example:\n"
       "  farpoint bugreport -o fault.tar.gz && tar -tf fault.tar.gz");
   command->callback([=] { *action = [=] { return run_bugreport(*options); }; });

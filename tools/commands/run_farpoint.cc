@@ -51,6 +51,7 @@ void add_help_command(CLI::App* app) {
       app->add_subcommand("help", "Explain a command, as its --help does: farpoint help import video");
   command->add_option_function<std::vector<std::string>>(
       "COMMAND", [](const std::vector<std::string>&) {}, "Command, and the layout of an import");
+  command->footer("Example: farpoint help import bag");
 }
 
 // CLI11 would only say that a command is missing. Empty where the word is a command or an option. `kind` is
