@@ -20,8 +20,9 @@ import stand_ins
 
 MARK = re.compile(r"^<!-- (?:run in (?P<scenario>\w+)|not run: (?P<reason>.+)) -->$")
 # What no test runs, or another one: programs of other projects and hardware, the build, the package.
-NOT_RUN = ("kalibr_calibrate_cameras ", "rosrun ", "v4l2-ctl ", "tools/deps ", "cmake ", "export PATH", "cp car/", "systemctl ",
-           "journalctl ", "farpoint top", "farpointd --config farpoint.yaml --set camera.device=usb:1-1 ")
+NOT_RUN = ("kalibr_calibrate_cameras ", "rosrun ", "ros2 run ", "v4l2-ctl ", "tools/deps ", "cmake ", "export PATH", "cp car/", "systemctl ",
+           "journalctl ", "farpoint top", "farpointd --config farpoint.yaml --set camera.device=usb:1-1 ",
+           "farpointd --check --config farpoint.yaml --set camera.device=usb:1-1 ")
 PICTURES, RATE_HZ = 240, 10
 
 

@@ -14,6 +14,7 @@ void add_import_command(CLI::App* app, Action* action);
 void add_export_command(CLI::App* app, Action* action);
 void add_dbc_command(CLI::App* app, Action* action);
 void add_evaluate_command(CLI::App* app, Action* action);
+void add_bugreport_command(CLI::App* app, Action* action);
 void add_bench_command(CLI::App* app, Action* action);
 void add_ctl_command(CLI::App* app, Action* action);
 void add_top_command(CLI::App* app, Action* action);

@@ -7,6 +7,7 @@
 
 #include "daemon/config/camera_file.h"
 #include "daemon/config/errors.h"
+#include "daemon/input/live_camera_options.h"
 #include "daemon/replay.h"
 #include "ipc/channels.h"
 #include "tests/daemon/live_fixture.h"

@@ -2,16 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes a small bag of ROS 2 as rosbag2 stores it in SQLite (CDR messages), by Python's sqlite3.
 
-usage: write_db3.py OUT.db3 [--sql TEXT] [--from N] [--to N]
+usage: write_db3.py OUT.db3 [--sql TEXT] [--from N] [--to N] [--packed]
 
 The topics of write_mcap.py. --sql is run at the end; --from and --to choose images, for a bag in several files.
+--packed: each message by zstd, as compression_mode message makes them.
 """
 
 import argparse
 import os
 import sqlite3
+import subprocess
 
 from write_mcap import SECONDS, camera_info, image, imu, odometry
+
+
+def packed(data):
+    """One zstd frame that names its size."""
+    return subprocess.run(["zstd", "-q", "-c", f"--stream-size={len(data)}"], input=data, capture_output=True,
+                          check=True).stdout
 
 
 def main():
@@ -20,6 +28,7 @@ def main():
     parser.add_argument("--sql", default="")
     parser.add_argument("--from", dest="first", type=int, default=0)
     parser.add_argument("--to", type=int, default=3)
+    parser.add_argument("--packed", action="store_true")
     options = parser.parse_args()
 
     if os.path.exists(options.out):
@@ -37,6 +46,8 @@ def main():
         database.execute("INSERT INTO topics VALUES (?, ?, ?, ?, '')", (number, name, kind, encoding))
 
     def put(topic, nanoseconds, data):
+        if options.packed:
+            data = packed(data)
         database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)",
                          (topic, SECONDS * 10**9 + nanoseconds, data))
 
