@@ -97,6 +97,7 @@ std::vector<ConfigKey> make_keys() {
       integer("record.waiting_images", "images", 2, 300, FIELD(record.waiting_images)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
+      enumeration("camera.use", {"all", "one"}, FIELD(camera.use)),
       enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),

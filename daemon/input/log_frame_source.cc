@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "daemon/config/rig.h"
@@ -13,7 +14,9 @@ namespace {
 
 drivers::LogSource open_source(const std::string& path, const Config& config) {
   try {
-    return drivers::LogSource(path, most_image_pixels(config), config.camera.index);
+    const bool all = config.camera.use == CameraUse::kAll;
+    return drivers::LogSource(path, most_image_pixels(config),
+                              all ? drivers::LogSource::kAllCameras : config.camera.index);
   } catch (const std::runtime_error& error) {
     const std::string what = error.what();
     const bool says = what.find("expected") != std::string::npos;
@@ -41,26 +44,15 @@ LogFrameSource::LogFrameSource(const std::string& path, const Config& config)
 }
 
 bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
+  std::swap(first_, next_first_);
+  next_first_.waits = false;
   drivers::LogItem item;
-  while (source_.next(&item)) {
-    offset_ = item.offset;
-    if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
-    feed(item);
-    if (item.kind != drivers::LogItemKind::kImage || item.camera != config_.camera.index) continue;
-    if (!calibration_) {
-      ++before_calibration_;
-      continue;
-    }
-    const StageScope scope(clock, timing_t::STAGE_DECODE);
-    const ipc::ImageStatus status = source_.decode(item, &image_);
-    if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
-    if (status != ipc::ImageStatus::kOk) {
-      say_undecodable(status);
-      continue;
-    }
-    *frame = {{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &image_};
-    gave_image_ = true;
-    given_utime_ = item.utime;
+  while (!may_give() && !ended_) {
+    ended_ = !source_.next(&item);
+    if (!ended_) take(item, clock);
+  }
+  if (first_.waits) {
+    give(frame);
     return true;
   }
   if (!source_.damage().read_error.empty()) {
@@ -68,6 +60,56 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   }
   if (!gave_image_) refuse_empty();
   return false;
+}
+
+void LogFrameSource::take(const drivers::LogItem& item, StageClock* clock) {
+  offset_ = item.offset;
+  if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
+  feed(item);
+  if (item.kind != drivers::LogItemKind::kImage) return;
+  if (item.camera == config_.camera.index) {
+    if (calibration_)
+      decode(item, clock, first_.waits ? &next_first_ : &first_);
+    else
+      ++before_calibration_;
+  } else if (item.camera == second_camera_) {
+    decode(item, clock, &second_);
+  }
+}
+
+void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, Decoded* out) {
+  const StageScope scope(clock, timing_t::STAGE_DECODE);
+  const ipc::ImageStatus status = source_.decode(item, &out->image);
+  if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
+  out->waits = status == ipc::ImageStatus::kOk;
+  if (out->waits)
+    out->meta = {item.utime, item.image->sequence, item.image->exposure_us, item.image->gain};
+  else
+    say_undecodable(status);
+}
+
+// Time of the second camera's image after the first's. Precondition: both wait.
+std::int64_t LogFrameSource::skew_us() const {
+  return second_.meta.utime - first_.meta.utime;
+}
+
+bool LogFrameSource::may_give() const {
+  if (!first_.waits) return false;
+  // A later image of the first camera has come, or one of the second that is no earlier than the partner.
+  return !second_camera_ || next_first_.waits ||
+         (second_.waits && skew_us() >= -config_.camera.pair_tolerance_us);
+}
+
+void LogFrameSource::give(SourceFrame* frame) {
+  std::swap(image_, first_.image);
+  *frame = {first_.meta, &image_, nullptr};
+  if (second_.waits && std::abs(skew_us()) <= config_.camera.pair_tolerance_us) {
+    frame->second = &second_.image;
+    second_.waits = false;
+  }
+  first_.waits = false;
+  gave_image_ = true;
+  given_utime_ = frame->meta.utime;
 }
 
 // Once: the counts say how many follow.
@@ -108,6 +150,7 @@ void LogFrameSource::take_calibration(const calibration_t& calibration) {
       throw InputError(name_ + ": " + error.what());
     }
     calibration_ = calibration;
+    second_camera_ = second_camera(calibration, config_.camera);
     return;
   }
   if (calibration_hash(calibration) == calibration_hash(*calibration_)) return;

@@ -142,7 +142,7 @@ void Session::publish_landmarks() {
 
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
                                       Outputs* outputs, bool with_schedule, bool keep_times) {
-  const slam::Rig rig = make_rig(calibration, config.camera.index);
+  const slam::Rig rig = make_rig(calibration, config.camera);
   outputs->set_body_is_camera(calibration.body_name.empty());
   try {
     const Session::Options options{calibration_hash(calibration), outputs->boot_counter(), with_schedule,

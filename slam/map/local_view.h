@@ -50,6 +50,7 @@ struct LocalView {
   int map_keyframes = 0;          // alive in this map
   double median_depth = 1.0;      // of the reference keyframe's landmarks, map units
   bool settled = false;           // the map's scale holds (mapping/settling)
+  bool metric = false;            // map units are metres
 
   // Keyframe::S_world_body of the reference.
   [[nodiscard]] Sim3 S_world_reference() const {

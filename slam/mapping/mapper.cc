@@ -16,8 +16,9 @@ constexpr int kFirstIterations = 20;
 // The camera whose calibration is refined.
 constexpr int kRefinedCamera = 0;
 
-MapOptions map_options(const EstimatorConfig& config) {
+MapOptions map_options(const EstimatorConfig& config, const Rig& rig) {
   MapOptions options;
+  options.views_per_keyframe = static_cast<int>(rig.cameras.size());
   options.wide_parallax_rad = config.landmarks.promote_parallax_rad;
   options.features = static_cast<std::size_t>(config.extractor.features);
   // Twice the longest list in use: keyframes that are removed leave gaps until the next update.
@@ -30,10 +31,11 @@ MapOptions map_options(const EstimatorConfig& config) {
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
-      map_(config.capacity, rig, map_options(config)),
+      map_(config.capacity, rig, map_options(config, rig)),
       keyframe_maker_(&map_, &counts_),
       duplicates_(config_, &map_, &counts_),
       landmark_maker_(config_, &map_, &counts_),
+      rig_depth_(config_, &map_, &landmark_maker_, &counts_),
       probation_(&map_, &counts_),
       window_(config_, &map_, &counts_),
       solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
@@ -50,6 +52,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
 std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std::int32_t map_id) {
   settling_.start_map();
   probation_.clear();
+  if (pair.second == nullptr) return start_metric_map(*pair.first, map_id);
   const KeyframeHandle first = keyframe_maker_.make(*pair.first, SE3{}, map_id);
   const KeyframeHandle second = keyframe_maker_.make(*pair.second, pair.T_first_second, map_id);
   if (first.is_null() || second.is_null()) {
@@ -65,6 +68,28 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
   }
   note_creation_sigmas(map_id);
   return make_view(second);
+}
+
+std::shared_ptr<const LocalView> Mapper::start_metric_map(const Frame& frame, std::int32_t map_id) {
+  const KeyframeHandle first = keyframe_maker_.make(frame, SE3{}, map_id);
+  if (first.is_null()) return nullptr;
+  rig_depth_.measure(first);
+  make_full(map_id);
+  if (count_landmarks(map_id) < static_cast<std::size_t>(config_.initialisation.min_landmarks) / 2) {
+    map_.discard_map(map_id);
+    return nullptr;
+  }
+  note_creation_sigmas(map_id);
+  map_.update_covisibility(first);
+  settling_.start_metric_map();
+  return make_view(first);
+}
+
+// A map's first points need no probation against keyframes that it does not have.
+void Mapper::make_full(std::int32_t map_id) {
+  map_.landmarks().for_each([&](LandmarkHandle, Landmark& l) {
+    if (l.map_id == map_id && l.state == LandmarkState::kWeak) l.state = LandmarkState::kFull;
+  });
 }
 
 void Mapper::add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second) {
@@ -93,8 +118,9 @@ bool Mapper::add_initial_landmark(const InitialPoint& point, Observer first, Obs
 
 std::size_t Mapper::count_landmarks(std::int32_t map_id) const {
   std::size_t count = 0;
-  map_.landmarks().for_each(
-      [&](LandmarkHandle, const Landmark& l) { count += l.map_id == map_id ? 1U : 0U; });
+  map_.landmarks().for_each([&](LandmarkHandle, const Landmark& l) {
+    count += l.map_id == map_id && l.state != LandmarkState::kBearing ? 1U : 0U;
+  });
   return count;
 }
 
@@ -137,8 +163,13 @@ void Mapper::attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& re
   for (const Sighting& s : request.sightings) {
     if (!map_.landmarks().contains(s.landmark)) continue;
     const auto camera = static_cast<std::uint8_t>(s.camera);
-    if (map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px, 0, camera}))
-      landmark_maker_.reconsider(s.landmark);
+    if (!map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px, 0, camera})) continue;
+    KeyframeView& view = map_.keyframes()[keyframe].views[camera];
+    if (!view.has_corners()) {
+      view.set.features[static_cast<std::size_t>(s.feature)].u_px = s.pixel.x();
+      view.set.features[static_cast<std::size_t>(s.feature)].v_px = s.pixel.y();
+    }
+    landmark_maker_.reconsider(s.landmark);
   }
   for (const SightingCount& c : request.counts)
     if (Landmark* l = map_.landmarks().get(c.landmark)) l->visible += c.visible, l->found += c.found;
@@ -148,6 +179,7 @@ void Mapper::make_landmarks(KeyframeHandle keyframe) {
   const std::uint64_t made = counts_.landmarks_made;
   landmark_maker_.process(
       keyframe, neighbours_of(map_, keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
+  if (settling_.metric()) rig_depth_.measure(keyframe);
   landmark_maker_.evict_bearings(keyframe);
   if (counts_.landmarks_made > made) probation_.admit_made_at(keyframe);
 }
@@ -169,7 +201,9 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   map_.update_covisibility(newest);
   const bool optimised = optimise(newest, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  if (optimised && config_.calibration.refine && settling_.fits_well()) refine_calibration();
+  // One camera's refined alone would bend what two of a metric rig agree on.
+  const bool alone = map_.camera_count() == 1;
+  if (optimised && alone && config_.calibration.refine && settling_.fits_well()) refine_calibration();
   const StageSpan span(listener_, Stage::kCulling);
   forget(newest);
   map_.update_covisibility(newest);

@@ -18,6 +18,7 @@
 #include "slam/mapping/keyframe_maker.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/probation.h"
+#include "slam/mapping/rig_depth.h"
 #include "slam/mapping/settling.h"
 #include "slam/mapping/view_builder.h"
 #include "slam/mapping/window.h"
@@ -37,6 +38,7 @@ class Mapper {
   void listen(StageListener* listener) { listener_ = listener; }
 
   // Starts a new map from two views. Null where too few points survive adjustment; the map is then discarded.
+  // From one frame that two cameras show, where the pair has no second: such a map is metric.
   std::shared_ptr<const LocalView> start_map(const InitialPair& pair, std::int32_t map_id);
 
   // Inserts a keyframe and returns the quick view: new landmarks, poses not yet optimised. Null where the
@@ -60,6 +62,8 @@ class Mapper {
   [[nodiscard]] std::size_t adjustment_bytes() const { return window_.bytes() + solver_.bytes(); }
 
  private:
+  std::shared_ptr<const LocalView> start_metric_map(const Frame& frame, std::int32_t map_id);
+  void make_full(std::int32_t map_id);
   void add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second);
   [[nodiscard]] bool add_initial_landmark(const InitialPoint& point, Observer first, Observer second);
   [[nodiscard]] std::size_t count_landmarks(std::int32_t map_id) const;
@@ -72,7 +76,7 @@ class Mapper {
   void refine_calibration();
   void forget(KeyframeHandle newest);
   [[nodiscard]] std::shared_ptr<const LocalView> make_view(KeyframeHandle reference) {
-    return view_builder_.build(reference, settling_.settled());
+    return view_builder_.build(reference, settling_.settled(), settling_.metric());
   }
 
   const EstimatorConfig config_;
@@ -81,6 +85,7 @@ class Mapper {
   KeyframeMaker keyframe_maker_;
   Duplicates duplicates_;
   LandmarkMaker landmark_maker_;
+  RigDepth rig_depth_;
   Probation probation_;
   Window window_;
   SchurSolver solver_;

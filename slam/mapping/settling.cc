@@ -8,8 +8,15 @@ namespace farpoint::slam {
 
 void Settling::start_map() {
   settled_ = false;
+  metric_ = false;
   steady_run_ = 0;
   soundness_ = {};
+}
+
+void Settling::start_metric_map() {
+  metric_ = true;
+  steady_run_ = kSteadyRun;
+  settled_ = sound_run_ == kSoundRun;
 }
 
 void Settling::note_adjustment(const Soundness& soundness, std::optional<double> scale_change,

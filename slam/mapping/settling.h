@@ -21,6 +21,8 @@ class Settling {
 
   // A new map is unsettled. The run of sound adjustments is kept.
   void start_map();
+  // The new map's unit is given: it holds from the start, unless an unsound adjustment came before.
+  void start_metric_map();
 
   // Takes in one adjustment. `scale_change`: median factor of the inverse depths; nothing is judged without
   // it. An unsound adjustment or a contradicted calibration unsettles at once.
@@ -28,6 +30,8 @@ class Settling {
                        bool calibration_contradicted);
 
   [[nodiscard]] bool settled() const { return settled_; }
+  // Whether map units are metres.
+  [[nodiscard]] bool metric() const { return metric_; }
   // Of the last adjustment of this map; zeros before the first.
   [[nodiscard]] const Soundness& soundness() const { return soundness_; }
   // Whether the map is good enough to refine the calibration from.
@@ -38,6 +42,7 @@ class Settling {
   int steady_run_ = 0;
   int sound_run_ = kSoundRun;  // at most kSoundRun
   bool settled_ = false;
+  bool metric_ = false;
 };
 
 }  // namespace farpoint::slam

@@ -41,10 +41,11 @@ bool ViewBuilder::guides_tracking(const Landmark& landmark) const {
          static_cast<int>(landmark.observations.size()) >= config_.landmarks.bearing_observations;
 }
 
-std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bool settled) {
+std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bool settled, bool metric) {
   const std::shared_ptr<LocalView> view = views_.take();
   if (!view) return view;
   begin(reference, settled, view.get());
+  view->metric = metric;
   select_keyframes(reference);
   is_taken_.assign(map_.landmarks().capacity(), 0);
   depths_.clear();

@@ -31,7 +31,8 @@ class ViewBuilder {
 
   // A view around `reference`, at most capacity.view_landmarks large. Null where all views are in use.
   // Precondition: the keyframe is alive.
-  [[nodiscard]] std::shared_ptr<const LocalView> build(KeyframeHandle reference, bool settled);
+  [[nodiscard]] std::shared_ptr<const LocalView> build(KeyframeHandle reference, bool settled,
+                                                       bool metric = false);
 
   // Memory of all views.
   [[nodiscard]] std::size_t bytes() const;
