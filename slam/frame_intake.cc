@@ -81,6 +81,11 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
                                 const Eigen::Vector2f& predicted_px, float max_shift_px) const override {
     return image.align(host, A, predicted_px, max_shift_px);
   }
+  [[nodiscard]] bool correlate(const Patch& host, const Eigen::Matrix2f& A,
+                               std::span<const Eigen::Vector2f> pixels,
+                               std::span<float> zncc) const override {
+    return image.correlate(host, A, pixels, zncc);
+  }
   Pyramid pyramid;
   PyramidImage image;
 };
@@ -132,12 +137,10 @@ std::shared_ptr<Frame> FrameIntake::take_frame(const Input& input) {
   frame->utime = input.utime;
   frame->sequence = input.sequence;
   frame->repeats = false;
-  for (int c = 0; c < frame->views.size(); ++c) {
-    FrameView& view = frame->views[c];
-    view.set.features.clear();
-    view.set.descriptors.clear();
-    view.grid.build(view.set.features);
-  }
+  FrameView& view = frame->views[0];
+  view.set.features.clear();
+  view.set.descriptors.clear();
+  view.grid.build(view.set.features);
   return frame;
 }
 

@@ -138,13 +138,16 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
-  settled_ = tracker_.view()->settled;
-  if (settled_) {
-    odometry_.follow_map();
-    recovery_.note_settled();
-  }
+  note_whether_settled();
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
+}
+
+void FrontEnd::note_whether_settled() {
+  settled_ = tracker_.view()->settled;
+  if (!settled_) return;
+  odometry_.follow_map();
+  recovery_.note_settled();
 }
 
 // Lockstep: within the frame that found the pair. Threads: before the first frame after mapping is done.
@@ -165,11 +168,12 @@ void FrontEnd::start_map(const MappingReply& reply) {
   ++counts_.maps;
   odometry_.begin_map();
   recovery_.begin_map();
-  settled_ = false;
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
   keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
   tracker_.set_view(reply.view);
+  note_whether_settled();
+  if (view.metric) no_depth_utime_.reset();
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });

@@ -72,6 +72,7 @@ class FrontEnd {
   void take_reply(const MappingReply& reply);
   void note_counts(const MappingReply& reply);
   void take_view(std::shared_ptr<const LocalView> view);
+  void note_whether_settled();
   void start_map(const MappingReply& reply);
   [[nodiscard]] MappingJob* begin_job(MappingJobKind kind);
   void send_job() { result_.job = port_.send_job(); }

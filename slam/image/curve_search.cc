@@ -25,7 +25,10 @@ constexpr float kDistinct = 1.5F;
 constexpr float kCommonLack = 0.02F;
 // Largest distance of the place found from the curve, pixels of the patch's level: alignment is good to a
 // tenth, a rig's calibration to about a pixel.
-constexpr float kMostOffCurve_level_px = 2.0F;
+constexpr float kMostOffCurve_level_px = 1.0F;
+// Least correlation of a match. Two images of one moment show a surface in one light: right matches correlate
+// by 0.95 and more, and a hundred places of a curve offer more chances of 0.8 than one.
+constexpr float kMinFine = 0.9F;
 // Alignments that end nearer to each other than this have found the same place.
 constexpr float kApart_level_px = 2.0F;
 // How far alignment may move from the sample, pixels of the patch's level.
@@ -130,7 +133,7 @@ CurveMatch CurveSearch::find(const CurveQuery& query) const {
   const std::size_t first = found[1].ok && (!found[0].ok || found[1].zncc > found[0].zncc) ? 1 : 0;
   const Alignment &best = found[first], &rival = found[1 - first];
   CurveMatch match;
-  if (!best.ok) return match;
+  if (!best.ok || best.zncc < kMinFine) return match;
   const bool elsewhere = (rival.pixel - best.pixel).norm() > kApart_level_px * query.level_scale;
   if (rival.ok && elsewhere && 1.0F - rival.zncc < kDistinct * (1.0F - best.zncc) + kCommonLack) return match;
   if (!is_on_curve(query, samples.inverse_depth_at(peaks[first]), best.pixel)) return match;
