@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <cstdio>
 
 #include "slam/mapping/forgetting.h"
 #include "slam/mapping/neighbours.h"
@@ -42,6 +43,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
               static_cast<std::size_t>(config.mapping.window_sightings)),
       calibrator_(config.calibration, rig.cameras[kRefinedCamera].camera, kRefinedCamera),
       view_builder_(config_, &map_) {
+  if (rig.cameras.size() > 1) rig_calibrator_.emplace(config.calibration, rig);
   if (config.mapping.solver == "ceres" && config.mapping.solve_instead == nullptr)
     throw std::invalid_argument("mapping.solver: ceres: no solver was given with it");
 }
@@ -201,9 +203,12 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   map_.update_covisibility(newest);
   const bool optimised = optimise(newest, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  // One camera's refined alone would bend what two of a metric rig agree on.
-  const bool alone = map_.camera_count() == 1;
-  if (optimised && alone && config_.calibration.refine && settling_.fits_well()) refine_calibration();
+  if (optimised && config_.calibration.refine) {
+    if (settling_.metric())
+      refine_rig();
+    else if (settling_.fits_well())
+      refine_calibration();
+  }
   const StageSpan span(listener_, Stage::kCulling);
   forget(newest);
   map_.update_covisibility(newest);
@@ -238,6 +243,19 @@ void Mapper::refine_calibration() {
   if (calibrator_.update(window_.problem(), d_bearing))
     map_.set_camera(calibrator_.camera_index(), calibrator_.camera());
   counts_.calibration_contradicted = calibrator_.contradicts_given();
+}
+
+void Mapper::refine_rig() {
+  const StageSpan span(listener_, Stage::kCalibration);
+  const auto d_bearing = window_.bearing_derivatives(kRefinedCamera);
+  const bool upd = rig_calibrator_->update(window_.problem(), d_bearing); fprintf(stderr, "RIGCAL"); for (int i=0;i<11;++i) fprintf(stderr, " %.5f+-%.5f", rig_calibrator_->delta()[i], rig_calibrator_->sigma()[i]); fprintf(stderr, "\n");
+  if (!upd) return;
+  const Rig& rig = rig_calibrator_->rig();
+  for (int c = 0; c < map_.camera_count(); ++c) {
+    const RigCamera& camera = rig.cameras[static_cast<std::size_t>(c)];
+    map_.set_camera(c, camera.camera);
+    map_.place_camera(c, camera.T_body_camera);
+  }
 }
 
 void Mapper::forget(KeyframeHandle newest) {

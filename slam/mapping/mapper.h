@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
@@ -18,6 +19,7 @@
 #include "slam/mapping/keyframe_maker.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/probation.h"
+#include "slam/mapping/rig_calibrator.h"
 #include "slam/mapping/rig_depth.h"
 #include "slam/mapping/settling.h"
 #include "slam/mapping/view_builder.h"
@@ -74,6 +76,7 @@ class Mapper {
   // Local bundle adjustment. False where nothing was optimised or the solution is unusable.
   bool optimise(KeyframeHandle centre, int iterations);
   void refine_calibration();
+  void refine_rig();
   void forget(KeyframeHandle newest);
   [[nodiscard]] std::shared_ptr<const LocalView> make_view(KeyframeHandle reference) {
     return view_builder_.build(reference, settling_.settled(), settling_.metric());
@@ -91,6 +94,7 @@ class Mapper {
   SchurSolver solver_;
   Settling settling_;
   Calibrator calibrator_;
+  std::optional<RigCalibrator> rig_calibrator_;  // of two cameras
   ViewBuilder view_builder_;
   StageListener* listener_ = nullptr;
 };
