@@ -52,7 +52,7 @@ Eigen::Matrix4d prior_information(const CalibrationConfig& config) {
 }  // namespace
 
 CameraDerivative camera_derivative(const Camera& camera, const Eigen::Vector3d& point_c,
-                                const Eigen::Vector2d& pixel) {
+                                   const Eigen::Vector2d& pixel) {
   const Camera::Parameters& p = camera.parameters();
   const double x = point_c.x(), y = point_c.y(), z = point_c.z();
   // The first coefficient k1 moves the distorted (x, y) on the plane z = 1 by so much of (x, y) itself:

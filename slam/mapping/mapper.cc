@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <cstdio>
 
 #include "slam/mapping/forgetting.h"
 #include "slam/mapping/neighbours.h"
@@ -231,7 +230,7 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   ++counts_.local_ba;
   if (!summary.usable) return false;
   const Soundness soundness = soundness_of(problem);
-  settling_.note_adjustment(soundness, window_.take_back(), calibrator_.contradicts_given());
+  settling_.note_adjustment(soundness, window_.take_back(), counts_.calibration_contradicted);
   return true;
 }
 
@@ -248,8 +247,9 @@ void Mapper::refine_calibration() {
 void Mapper::refine_rig() {
   const StageSpan span(listener_, Stage::kCalibration);
   const auto d_bearing = window_.bearing_derivatives(kRefinedCamera);
-  const bool upd = rig_calibrator_->update(window_.problem(), d_bearing); fprintf(stderr, "RIGCAL"); for (int i=0;i<11;++i) fprintf(stderr, " %.5f+-%.5f", rig_calibrator_->delta()[i], rig_calibrator_->sigma()[i]); fprintf(stderr, "\n");
-  if (!upd) return;
+  const bool moved = rig_calibrator_->update(window_.problem(), d_bearing);
+  counts_.calibration_contradicted = rig_calibrator_->contradicts_given();
+  if (!moved) return;
   const Rig& rig = rig_calibrator_->rig();
   for (int c = 0; c < map_.camera_count(); ++c) {
     const RigCamera& camera = rig.cameras[static_cast<std::size_t>(c)];

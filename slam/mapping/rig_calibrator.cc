@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "slam/mapping/window_equations.h"
 
@@ -12,7 +13,8 @@ namespace farpoint::slam {
 namespace {
 
 constexpr int kFirst = 0, kSecond = 1, kCameras = 2;
-constexpr int kRotation = 8;  // first of its three parameters
+constexpr int kRotation = 2;    // first of its three parameters
+constexpr int kDistortion = 3;  // in CalibrationDelta
 // Of the second camera against the first, as a good calibration knows it: a tenth of a degree, 1 sigma.
 constexpr double kRotationSigma_rad = 0.002;
 // As Calibrator.
@@ -31,7 +33,7 @@ class RigModelOfWindow {
     PixelDerivative J = PixelDerivative::Zero();
     if (camera >= kCameras) return J;
     const Camera& model = rig_.cameras[static_cast<std::size_t>(camera)].camera;
-    J.middleCols<4>(4 * camera) = camera_derivative(model, point_c, pixel);
+    J.col(camera) = camera_derivative(model, point_c, pixel).col(kDistortion);
     if (camera == kSecond) {
       // Turned by exp(phi) in its own axes, the camera sees exp(-phi) p = p + [p]x phi.
       Eigen::Vector2d projected;
@@ -45,7 +47,7 @@ class RigModelOfWindow {
     const Camera& model = rig_.cameras[kFirst].camera;
     if (!model.project(bearing, &pixel)) return false;
     out->setZero();
-    out->leftCols<4>() = camera_derivative(model, bearing, pixel);
+    out->col(kFirst) = camera_derivative(model, bearing, pixel).col(kDistortion);
     return true;
   }
   [[nodiscard]] bool measures_within(int camera) const { return camera == kSecond; }
@@ -56,9 +58,7 @@ class RigModelOfWindow {
 
 Eigen::Matrix<double, RigCalibrator::kSize, 1> prior_sigma(const CalibrationConfig& config) {
   Eigen::Matrix<double, RigCalibrator::kSize, 1> sigma;
-  const Eigen::Vector4d camera(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
-                               config.distortion_sigma);
-  sigma << camera, camera, Eigen::Vector3d::Constant(kRotationSigma_rad);
+  sigma << config.distortion_sigma, config.distortion_sigma, Eigen::Vector3d::Constant(kRotationSigma_rad);
   return sigma;
 }
 
@@ -75,10 +75,20 @@ RigCalibrator::Delta RigCalibrator::sigma() const {
   return information_.inverse().diagonal().cwiseSqrt();
 }
 
+double RigCalibrator::surprise() const {
+  const Square of_images = information_ - prior_;
+  const Square covariance = of_images + of_images * prior_.inverse() * of_images;
+  return std::sqrt(std::max(0.0, information_vector_.dot(covariance.ldlt().solve(information_vector_))));
+}
+
 Rig RigCalibrator::changed(const Delta& delta) const {
   Rig rig = given_;
-  rig.cameras[kFirst].camera = refined_camera(given_.cameras[kFirst].camera, delta.head<4>());
-  rig.cameras[kSecond].camera = refined_camera(given_.cameras[kSecond].camera, delta.segment<4>(4));
+  for (int c = 0; c < kCameras; ++c) {
+    CalibrationDelta of_camera = CalibrationDelta::Zero();
+    of_camera[kDistortion] = delta[c];
+    Camera& camera = rig.cameras[static_cast<std::size_t>(c)].camera;
+    camera = refined_camera(camera, of_camera);
+  }
   SE3& T_body_second = rig.cameras[kSecond].T_body_camera;
   T_body_second.q = (T_body_second.q * so3_exp(delta.tail<3>())).normalized();
   return rig;
@@ -105,6 +115,8 @@ bool RigCalibrator::update(const BundleProblem& problem,
   const auto windows = static_cast<double>(free);
   information_ = prior_ + kRemembered * (information_ - prior_) + H / windows;
   information_vector_ = kRemembered * information_vector_ + (H * delta_ - g) / windows;
+  constexpr double kContradicts = 5.0, kAgrees = 3.0;
+  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
   const Rig next = changed(best);
   double change_px = 0.0;
   for (std::size_t c = 0; c < kCameras; ++c) {
@@ -112,7 +124,8 @@ bool RigCalibrator::update(const BundleProblem& problem,
     change_px = std::max(change_px, image_change_px(rig_.cameras[c].camera, next.cameras[c].camera));
   }
   const double turned_rad =
-      so3_log(rig_.cameras[kSecond].T_body_camera.q.conjugate() * next.cameras[kSecond].T_body_camera.q).norm();
+      so3_log(rig_.cameras[kSecond].T_body_camera.q.conjugate() * next.cameras[kSecond].T_body_camera.q)
+          .norm();
   change_px = std::max(change_px, turned_rad * rig_.cameras[kSecond].camera.focal_px());
   if (change_px < kNoticeable_px) return false;
   delta_ = best;
