@@ -240,7 +240,7 @@ float correlation(const std::uint8_t* corner, int stride_bytes, const CoarseTemp
       bias += t;
     }
   }
-  // The template's mean is zero but for rounding.
+  // The template's mean is zero except for rounding.
   const float mean = static_cast<float>(sum) / kCount;
   const float energy = static_cast<float>(squares) - static_cast<float>(sum) * mean;
   if (!(energy > kMinNoise * kMinNoise * kCount)) return -1.0F;

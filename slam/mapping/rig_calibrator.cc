@@ -15,7 +15,7 @@ namespace {
 constexpr int kFirst = 0, kSecond = 1, kCameras = 2;
 constexpr int kRotation = 2;    // first of its three parameters
 constexpr int kDistortion = 3;  // in CalibrationDelta
-// Of the second camera against the first, as a good calibration knows it: a tenth of a degree, 1 sigma.
+// Error of the rotation between the cameras in a good calibration: a tenth of a degree, 1 sigma.
 constexpr double kRotationSigma_rad = 0.002;
 // As Calibrator.
 constexpr double kRemembered = 0.98;
