@@ -4,8 +4,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
-#include <cstdlib>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/config/rig.h"
 
@@ -44,14 +44,12 @@ LogFrameSource::LogFrameSource(const std::string& path, const Config& config)
 }
 
 bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
-  std::swap(first_, next_first_);
-  next_first_.waits = false;
   drivers::LogItem item;
   while (!may_give() && !ended_) {
     ended_ = !source_.next(&item);
     if (!ended_) take(item, clock);
   }
-  if (first_.waits) {
+  if (!firsts_.empty()) {
     give(frame);
     return true;
   }
@@ -69,45 +67,50 @@ void LogFrameSource::take(const drivers::LogItem& item, StageClock* clock) {
   if (item.kind != drivers::LogItemKind::kImage) return;
   if (item.camera == config_.camera.index) {
     if (calibration_)
-      decode(item, clock, first_.waits ? &next_first_ : &first_);
+      decode(item, clock, &firsts_);
     else
       ++before_calibration_;
   } else if (item.camera == second_camera_) {
-    decode(item, clock, &second_);
+    decode(item, clock, &seconds_);
   }
 }
 
-void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, Decoded* out) {
+void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, std::deque<Decoded>* out) {
   const StageScope scope(clock, timing_t::STAGE_DECODE);
-  const ipc::ImageStatus status = source_.decode(item, &out->image);
+  const ipc::ImageStatus status = source_.decode(item, &spare_);
   if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
-  out->waits = status == ipc::ImageStatus::kOk;
-  if (out->waits)
-    out->meta = {item.utime, item.image->sequence, item.image->exposure_us, item.image->gain};
-  else
-    say_undecodable(status);
+  if (status != ipc::ImageStatus::kOk) return say_undecodable(status);
+  out->push_back({{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain},
+                  std::exchange(spare_, {})});
 }
 
-// Time of the second camera's image after the first's. Precondition: both wait.
-std::int64_t LogFrameSource::skew_us() const {
-  return second_.meta.utime - first_.meta.utime;
+// Precondition: an image of the first camera waits.
+void LogFrameSource::forget_past_seconds() {
+  const std::int64_t oldest = firsts_.front().meta.utime - config_.camera.pair_tolerance_us;
+  while (!seconds_.empty() && seconds_.front().meta.utime < oldest) {
+    spare_ = std::move(seconds_.front().image);
+    seconds_.pop_front();
+  }
 }
 
-bool LogFrameSource::may_give() const {
-  if (!first_.waits) return false;
-  // A later image of the first camera has come, or one of the second that is no earlier than the partner.
-  return !second_camera_ || next_first_.waits ||
-         (second_.waits && skew_us() >= -config_.camera.pair_tolerance_us);
+bool LogFrameSource::may_give() {
+  if (firsts_.empty()) return false;
+  forget_past_seconds();
+  return !second_camera_ || !seconds_.empty() || firsts_.size() > kAhead;
 }
 
 void LogFrameSource::give(SourceFrame* frame) {
-  std::swap(image_, first_.image);
-  *frame = {first_.meta, &image_, nullptr};
-  if (second_.waits && std::abs(skew_us()) <= config_.camera.pair_tolerance_us) {
-    frame->second = &second_.image;
-    second_.waits = false;
+  forget_past_seconds();
+  std::swap(image_, firsts_.front().image);
+  *frame = {firsts_.front().meta, &image_, nullptr};
+  spare_ = std::move(firsts_.front().image);
+  firsts_.pop_front();
+  if (!seconds_.empty() &&
+      seconds_.front().meta.utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {
+    std::swap(second_image_, seconds_.front().image);
+    seconds_.pop_front();
+    frame->second = &second_image_;
   }
-  first_.waits = false;
   gave_image_ = true;
   given_utime_ = frame->meta.utime;
 }
