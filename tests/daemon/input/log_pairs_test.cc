@@ -67,8 +67,8 @@ TEST_F(LogPairs, EitherImageMayComeFirst) {
 }
 
 TEST_F(LogPairs, AMissingOrDistantSecondImageLeavesTheFrameAlone) {
-  write({{0, 0}, {1, 0}, {0, 1}, {1, 1}, {0, 2}, {0, 3}, {1, 3, 20'000}, {0, 4}, {1, 4}});
-  EXPECT_EQ(read(), std::vector<bool>({true, true, false, false, true}));
+  write({{0, 0}, {1, 0}, {0, 1}, {1, 1}, {0, 2}, {1, 2}, {0, 3}, {0, 4}, {1, 4, 20'000}, {0, 5}, {1, 5}});
+  EXPECT_EQ(read(), std::vector<bool>({true, true, true, false, false, true}));
 }
 
 TEST_F(LogPairs, ASecondImageWithoutTheFirstIsPassedOver) {
