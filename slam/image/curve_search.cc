@@ -72,17 +72,18 @@ bool CurveSearch::sample(const CurveQuery& query, Samples* samples) const {
     const double speed_px = std::max(from.d_inverse_depth.norm(), 1e-9);
     const double step = step_px / speed_px;
     const int block = std::min(kBlock, kMostSamples - samples->count);
+    const auto first = static_cast<std::size_t>(samples->count);
     Place to;
     const bool visible = place_at(query, rho + block * step, &to);
     const Eigen::Vector2d along = visible ? Eigen::Vector2d((to.pixel - from.pixel) / block)
                                           : Eigen::Vector2d(step * from.d_inverse_depth);
     for (int i = 0; i < block; ++i) {
       pixels[static_cast<std::size_t>(i)] = (from.pixel + i * along).cast<float>();
-      samples->inverse_depth[static_cast<std::size_t>(samples->count + i)] = rho + i * step;
+      samples->inverse_depth[first + static_cast<std::size_t>(i)] = rho + i * step;
     }
     const auto n = static_cast<std::size_t>(block);
     if (!image_.correlate(*query.patch, from.A_target_host, std::span(pixels).first(n),
-                          std::span(samples->zncc).subspan(static_cast<std::size_t>(samples->count), n)))
+                          std::span(samples->zncc).subspan(first, n)))
       return samples->count > 0;
     samples->count += block;
     rho += block * step;
