@@ -216,6 +216,8 @@ void LiveRun::open_wheels() {
 }
 
 std::unique_ptr<Session> LiveRun::open_session() {
+  // Images of a second camera are recorded; no queue carries them to tracking.
+  if (calibration_.cameras.size() > 1) config_.camera.use = CameraUse::kOne;
   const std::string second = config_.camera.has_second() ? " and " + config_.camera.second_device : "";
   spdlog::info("farpointd {}, configuration {:016x}, live from {} {}{}", build_text(), config_hash(config_),
                value_text(config_, "camera.driver"), config_.camera.device, second);

@@ -24,10 +24,10 @@ void check_rig(const Rig& rig) {
       throw std::invalid_argument("camera '" + c.name + "': mask of another size than the camera's images");
 }
 
-// The map has no metric scale.
+// One camera's map has no metric scale; that of two has.
 Rig usable_rig(const Rig& rig) {
   check_rig(rig);
-  return with_body_at_camera(rig, 0);
+  return rig.cameras.size() > 1 ? rig : with_body_at_camera(rig, 0);
 }
 
 }  // namespace

@@ -32,9 +32,7 @@ FrameView full_view(const Camera& camera, std::size_t features) {
 std::shared_ptr<Frame> full_frame(const Rig& rig, int cameras, const EstimatorConfig& config) {
   auto frame = std::make_shared<Frame>();
   frame->views = PerCamera<FrameView>(cameras);
-  for (int c = 0; c < cameras; ++c)
-    frame->views[c] = full_view(rig.cameras[static_cast<std::size_t>(c)].camera,
-                                static_cast<std::size_t>(config.extractor.features));
+  frame->views[0] = full_view(rig.cameras[0].camera, static_cast<std::size_t>(config.extractor.features));
   return frame;
 }
 
@@ -86,26 +84,32 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
     return image.align(host, A, predicted_px, max_shift_px);
   }
   std::shared_ptr<const ImageMask> mask;
+
+  [[nodiscard]] bool correlate(const Patch& host, const Eigen::Matrix2f& A,
+                               std::span<const Eigen::Vector2f> pixels,
+                               std::span<float> zncc) const override {
+    return image.correlate(host, A, pixels, zncc);
+  }
   Pyramid pyramid;
   PyramidImage image;
 };
 
 struct FrameIntake::CameraIntake {
   CameraIntake(const RigCamera& of, const EstimatorConfig& config)
-      : camera(of.camera),
-        mask(of.mask),
-        extractor(camera.width_px(), camera.height_px(), config.pyramid, config.extractor),
-        pyramids(pyramid_count(config),
-                 [&of, &config] { return std::make_shared<PyramidBuffer>(of, config.pyramid); }) {}
+      : camera(of.camera), mask(of.mask), pyramids(pyramid_count(config), [&of, &config] {
+          return std::make_shared<PyramidBuffer>(of, config.pyramid);
+        }) {}
 
   Camera camera;
   std::shared_ptr<const ImageMask> mask;  // null: none
-  Extractor extractor;
   SharedPool<PyramidBuffer> pyramids;
   std::uint64_t image_hash = 0;  // of the last image
 };
 
-FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras) : config_(config) {
+FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras)
+    : config_(config),
+      extractor_(rig.cameras[0].camera.width_px(), rig.cameras[0].camera.height_px(), config.pyramid,
+                 config.extractor) {
   cameras_.reserve(static_cast<std::size_t>(cameras));
   for (int c = 0; c < cameras; ++c)
     cameras_.push_back(std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)], config_));
@@ -137,26 +141,22 @@ std::shared_ptr<Frame> FrameIntake::take_frame(const Input& input) {
   frame->utime = input.utime;
   frame->sequence = input.sequence;
   frame->repeats = false;
-  for (int c = 0; c < frame->views.size(); ++c) {
-    FrameView& view = frame->views[c];
-    view.set.features.clear();
-    view.set.descriptors.clear();
-    view.grid.build(view.set.features);
-  }
+  FrameView& view = frame->views[0];
+  view.set.features.clear();
+  view.set.descriptors.clear();
+  view.grid.build(view.set.features);
   return frame;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(const FrameInput& input) {
   const CameraImage first{input.camera, input.image};
-  const bool takes_others = std::all_of(input.others.begin(), input.others.end(),
-                                        [this](const CameraImage& image) { return takes(image); });
-  if (!takes(first) || !takes_others || !advance(input.utime)) return {};
+  if (input.camera != 0 || !takes(first) || !advance(input.utime)) return {};
   std::shared_ptr<Frame> frame = take_frame(input);
   if (!frame) return {};
   frame->repeats = true;
   if (!fill_view(first, input.most_features, frame.get())) return {};
   for (const CameraImage& other : input.others)
-    if (!fill_view(other, input.most_features, frame.get())) return {};
+    if (other.camera > 0 && takes(other)) fill_pixels(other, frame.get());
   return frame;
 }
 
@@ -174,10 +174,21 @@ bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* 
     pixels->pyramid.build(input.image);
   }
   const StageSpan span(listener_, Stage::kExtraction);
-  camera.extractor.extract(pixels->pyramid, camera.mask.get(), &view.set, most_features);
+  extractor_.extract(pixels->pyramid, camera.mask.get(), &view.set, most_features);
   view.image = pixels;
   view.grid.build(view.set.features);
   return true;
+}
+
+void FrameIntake::fill_pixels(const CameraImage& input, Frame* frame) {
+  CameraIntake& camera = *cameras_[static_cast<std::size_t>(input.camera)];
+  const std::uint64_t hash = pixel_hash(input.image);
+  if (std::exchange(camera.image_hash, hash) == hash) return;  // of the past
+  const std::shared_ptr<PyramidBuffer> pixels = camera.pyramids.take();
+  if (!pixels) return;
+  const StageSpan span(listener_, Stage::kPyramid);
+  pixels->pyramid.build(input.image);
+  frame->views[input.camera].image = pixels;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(FeatureInput&& input) {

@@ -18,6 +18,13 @@ std::int64_t seconds_to_us(double s) {
   return static_cast<std::int64_t>(std::llround(1e6 * s));
 }
 
+// More than one camera gave pixels: the frame has depth of its own.
+bool shows_pair(const Frame& frame) {
+  for (int c = 1; c < frame.views.size(); ++c)
+    if (frame.views[c].image) return frame.views[0].image != nullptr;
+  return false;
+}
+
 int quality_of(const TrackOutcome& outcome) {
   const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
   return static_cast<int>(std::lround(100.0 * share));
@@ -27,9 +34,9 @@ int quality_of(const TrackOutcome& outcome) {
 
 FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
     : config_(config),
-      intake_(config, rig),
+      intake_(config, rig, static_cast<int>(rig.cameras.size())),
       initialiser_(config, rig),
-      tracker_(config),
+      tracker_(config, static_cast<int>(rig.cameras.size())),
       port_(config.mapping, rings),
       odometry_(config.odometry),
       repeated_(static_cast<std::size_t>(config.extractor.features)),
@@ -77,7 +84,9 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   repeated_share_ = repeated_.add(frame->views[0].set);
   const bool blind = result_.features < config_.tracking.min_inliers;
   const bool held = frame->repeats && is_valid(state_) && standstill_.explains_repeat(frame->utime);
-  if (state_ == State::kInitialising) {
+  if (!blind && replaces_map(*frame)) {
+    give_up_map(recovery_.ever_settled() ? MappingJobKind::kRetireMap : MappingJobKind::kDiscardMap, frame);
+  } else if (state_ == State::kInitialising) {
     if (!blind) initialise(frame);
   } else if (held) {
     hold_pose(*frame);
@@ -152,19 +161,30 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
-  if (tracker_.view()->judgement.steady) {
-    odometry_.follow_map();
-    recovery_.note_settled();
-  }
+  note_whether_settled();
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
+}
+
+void FrontEnd::note_whether_settled() {
+  if (!tracker_.view()->judgement.steady) return;
+  odometry_.follow_map();
+  recovery_.note_settled();
 }
 
 // Lockstep: within the frame that found the pair. Threads: before the first frame after mapping is done.
 void FrontEnd::start_map(const MappingReply& reply) {
   const auto pair = std::exchange(start_pair_, {});
-  if (!reply.view) return;
-  const Frame &first = *pair.first, &second = *pair.second;
+  if (!reply.view) {
+    if (pair.first && !pair.second) {
+      // The frame stays to be posed; its pixels are wanted no longer.
+      pair.first->drop_pixels();
+      no_depth_utime_ = pair.first->utime;
+    }
+    return;
+  }
+  const bool one_frame = pair.second == nullptr;
+  const Frame &first = *pair.first, &second = one_frame ? first : *pair.second;
   const LocalView& view = *reply.view;
   ++map_id_;
   ++counts_.maps;
@@ -175,11 +195,13 @@ void FrontEnd::start_map(const MappingReply& reply) {
   keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
   tracker_.set_view(reply.view);
+  note_whether_settled();
+  if (view.judgement.metric) no_depth_utime_.reset();
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });
   for (const auto& f : waiting_) f->drop_pixels();
-  record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
+  if (!one_frame) record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
   record({second.utime, map_id_, view.reference_id,
           view.S_world_reference().inverse() * view.T_world_reference});
   initialiser_.clear();
@@ -201,19 +223,43 @@ MappingJob* FrontEnd::begin_job(MappingJobKind kind) {
 // --- before the map
 
 void FrontEnd::initialise(const std::shared_ptr<Frame>& frame) {
-  if (start_pair_.second) {
+  if (start_pair_.first) {
     initialiser_.remember(frame);
+    return;
+  }
+  if (may_start_metric(*frame)) {
+    initialiser_.remember(frame);
+    InitialPair pair;
+    pair.first = frame;
+    start_from(pair);
     return;
   }
   const InitialPair* pair = initialiser_.add(frame);
   result_.matches = initialiser_.last_matches();
-  if (pair == nullptr) return;
+  if (pair != nullptr) start_from(*pair);
+}
+
+// Where all is too far for the rig's baseline, motion makes a map; the rig is asked again now and then.
+bool FrontEnd::may_start_metric(const Frame& frame) const {
+  constexpr double kRetry_s = 1.0;
+  return shows_pair(frame) &&
+         (!no_depth_utime_ || seconds_between(*no_depth_utime_, frame.utime) >= kRetry_s);
+}
+
+// The map was made before the further camera came: its unit is unknown, the new one's will be the metre.
+bool FrontEnd::replaces_map(const Frame& frame) const {
+  const LocalView* view = tracker_.view();
+  return state_ != State::kInitialising && view != nullptr && !view->judgement.metric && !no_depth_utime_ &&
+         shows_pair(frame);
+}
+
+void FrontEnd::start_from(const InitialPair& pair) {
   MappingJob* job = begin_job(MappingJobKind::kStartMap);
   if (job == nullptr) return;
   job->map_id = map_id_ + 1;
-  job->pair = *pair;
+  job->pair = pair;
   send_job();
-  start_pair_ = {pair->first, pair->second};
+  start_pair_ = {pair.first, pair.second};
 }
 
 // --- against the map
@@ -313,7 +359,10 @@ void FrontEnd::give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& fr
   waiting_.clear();
   initialiser_.clear();
   state_ = State::kInitialising;
-  (void)initialiser_.add(frame);
+  if (may_start_metric(*frame))
+    initialise(frame);
+  else
+    (void)initialiser_.add(frame);
 }
 
 // --- hand-over to mapping
@@ -389,6 +438,7 @@ void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
   odometry_.advance(T_map_body, result_.utime, std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
   result_.has_pose = true;
   result_.T_map_body = T_map_body;
+  if (tracker_.view() != nullptr && tracker_.view()->judgement.metric) result_.scale = ScaleState::kMetric;
   result_.T_odom_body = odometry_.T_odom_body();
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
   result_.velocity_body = tracker_.velocity_body();

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -75,11 +76,15 @@ class FrontEnd {
   void take_reply(const MappingReply& reply);
   void note_counts(const MappingReply& reply);
   void take_view(std::shared_ptr<const LocalView> view);
+  void note_whether_settled();
   void start_map(const MappingReply& reply);
   [[nodiscard]] MappingJob* begin_job(MappingJobKind kind);
   void send_job() { result_.job = port_.send_job(); }
 
   void initialise(const std::shared_ptr<Frame>& frame);
+  void start_from(const InitialPair& pair);
+  [[nodiscard]] bool may_start_metric(const Frame& frame) const;
+  [[nodiscard]] bool replaces_map(const Frame& frame) const;
   void skip_blind_frame();
   void hold_pose(const Frame& frame);
   void follow(const std::shared_ptr<Frame>& frame);
@@ -116,8 +121,11 @@ class FrontEnd {
   TrackOutcome last_outcome_;  // accepted
 
   std::int32_t map_id_ = 0;
-  std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;  // that a map is being made from
-  std::int64_t keyframe_utime_ = 0;                                       // of the last keyframe sent
+  // That a map is being made from; the second is null where one frame's cameras are the pair.
+  std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;
+  // Time of the last frame whose cameras showed too little depth for a map.
+  std::optional<std::int64_t> no_depth_utime_;
+  std::int64_t keyframe_utime_ = 0;  // of the last keyframe sent
   // Frames from before the map, posed once it has settled.
   std::vector<std::shared_ptr<Frame>> waiting_;
   std::uint64_t last_before_map_ = 0;

@@ -33,6 +33,7 @@ class Recovery {
   void note_tracked() { lost_frames_ = 0; }
   // The present map has settled: its unit has held once. It is kept when it is lost, whatever comes after.
   void note_settled() { ever_settled_ = true; }
+  [[nodiscard]] bool ever_settled() const { return ever_settled_; }
   // A frame was searched in vain.
   [[nodiscard]] Verdict note_lost(std::int64_t utime);
   // After note_lost(): lost at the first such frame, relocalising from the second on.

@@ -41,6 +41,8 @@ struct RecordConfig {
 
 enum class CameraDriverChoice { kV4l2, kLibcamera, kFile, kLcm };
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
+// Which cameras of a log the estimator uses.
+enum class CameraUse { kAll, kOne };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
 
@@ -55,6 +57,7 @@ struct ExposureConfig {
 
 struct CameraConfig {
   int index = 0;  // the tracked camera, in the log and its calibration
+  CameraUse use = CameraUse::kAll;
   // Live.
   CameraDriverChoice driver = CameraDriverChoice::kV4l2;
   std::string device = "/dev/video0";

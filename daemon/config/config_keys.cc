@@ -99,6 +99,7 @@ std::vector<ConfigKey> make_keys() {
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
       text("camera.mask", FIELD(camera.mask)),
       text("camera.second_mask", FIELD(camera.second_mask)),
+      enumeration("camera.use", {"all", "one"}, FIELD(camera.use)),
       enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),

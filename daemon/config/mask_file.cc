@@ -12,6 +12,7 @@
 #include <system_error>
 #include <vector>
 
+#include "daemon/config/rig.h"
 #include "ipc/file_kind.h"
 #include "ipc/image_codec.h"
 #include "ipc/printable.h"
@@ -97,6 +98,7 @@ std::shared_ptr<const slam::ImageMask> read_mask(const CameraConfig& config, int
 }
 
 void read_masks(const CameraConfig& config, const calibration_t& calibration, slam::Rig* rig) {
+  const std::optional<int> second = second_camera(calibration, config);
   for (std::size_t c = 0; c < calibration.cameras.size(); ++c) {
     const camera_calibration_t& camera = calibration.cameras[c];
     const auto mask = read_mask(config, static_cast<int>(c), camera.width, camera.height);
@@ -104,6 +106,7 @@ void read_masks(const CameraConfig& config, const calibration_t& calibration, sl
     spdlog::info("camera {}: mask {}: {:.1f} % of the image", c, c == 0 ? config.mask : config.second_mask,
                  100.0 * mask->share());
     if (static_cast<int>(c) == config.index) rig->cameras.front().mask = mask;
+    if (second == static_cast<int>(c) && rig->cameras.size() > 1) rig->cameras.back().mask = mask;
   }
 }
 

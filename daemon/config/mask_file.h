@@ -19,8 +19,9 @@ inline constexpr double kMostMaskedShare = 0.9;
 [[nodiscard]] std::shared_ptr<const slam::ImageMask> read_mask(const CameraConfig& config, int camera,
                                                                int width_px, int height_px);
 
-// Gives the rig's only camera, config.index, its mask. Masks of the calibration's other cameras are read and
-// checked all the same. Throws as read_mask() does. Logs the share of each mask.
+// Gives the rig's cameras their masks: the tracked one, and second_camera() where there is one. Masks of the
+// calibration's other cameras are read and checked all the same. Throws as read_mask() does. Logs the share
+// of each mask.
 void read_masks(const CameraConfig& config, const calibration_t& calibration, slam::Rig* rig);
 
 }  // namespace farpoint::daemon

@@ -16,6 +16,8 @@ namespace farpoint::daemon {
 // One decoded image and its data.
 struct CapturedImage {
   ipc::GreyImage image;
+  ipc::GreyImage second;  // the second camera's; in use with has_second only
+  bool has_second = false;
   drivers::CameraFrame meta;
   InputCounts in;                   // at the time of reading
   std::int64_t frames_dropped = 0;  // at the time of queueing

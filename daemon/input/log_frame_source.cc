@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "daemon/config/rig.h"
 
@@ -13,7 +14,9 @@ namespace {
 
 drivers::LogSource open_source(const std::string& path, const Config& config) {
   try {
-    return drivers::LogSource(path, most_image_pixels(config), config.camera.index);
+    const bool all = config.camera.use == CameraUse::kAll;
+    return drivers::LogSource(path, most_image_pixels(config),
+                              all ? drivers::LogSource::kAllCameras : config.camera.index);
   } catch (const std::runtime_error& error) {
     const std::string what = error.what();
     const bool says = what.find("expected") != std::string::npos;
@@ -42,25 +45,12 @@ LogFrameSource::LogFrameSource(const std::string& path, const Config& config)
 
 bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   drivers::LogItem item;
-  while (source_.next(&item)) {
-    offset_ = item.offset;
-    if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
-    feed(item);
-    if (item.kind != drivers::LogItemKind::kImage || item.camera != config_.camera.index) continue;
-    if (!calibration_) {
-      ++before_calibration_;
-      continue;
-    }
-    const StageScope scope(clock, timing_t::STAGE_DECODE);
-    const ipc::ImageStatus status = source_.decode(item, &image_);
-    if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
-    if (status != ipc::ImageStatus::kOk) {
-      say_undecodable(status);
-      continue;
-    }
-    *frame = {{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &image_};
-    gave_image_ = true;
-    given_utime_ = item.utime;
+  while (!may_give() && !ended_) {
+    ended_ = !source_.next(&item);
+    if (!ended_) take(item, clock);
+  }
+  if (!firsts_.empty()) {
+    give(frame);
     return true;
   }
   if (!source_.damage().read_error.empty()) {
@@ -68,6 +58,61 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   }
   if (!gave_image_) refuse_empty();
   return false;
+}
+
+void LogFrameSource::take(const drivers::LogItem& item, StageClock* clock) {
+  offset_ = item.offset;
+  if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
+  feed(item);
+  if (item.kind != drivers::LogItemKind::kImage) return;
+  if (item.camera == config_.camera.index) {
+    if (calibration_)
+      decode(item, clock, &firsts_);
+    else
+      ++before_calibration_;
+  } else if (item.camera == second_camera_) {
+    decode(item, clock, &seconds_);
+  }
+}
+
+void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, std::deque<Decoded>* out) {
+  const StageScope scope(clock, timing_t::STAGE_DECODE);
+  const ipc::ImageStatus status = source_.decode(item, &spare_);
+  if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
+  if (status != ipc::ImageStatus::kOk) return say_undecodable(status);
+  out->push_back({{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain},
+                  std::exchange(spare_, {})});
+}
+
+// Precondition: an image of the first camera waits.
+void LogFrameSource::forget_past_seconds() {
+  const std::int64_t oldest = firsts_.front().meta.utime - config_.camera.pair_tolerance_us;
+  while (!seconds_.empty() && seconds_.front().meta.utime < oldest) {
+    spare_ = std::move(seconds_.front().image);
+    seconds_.pop_front();
+  }
+}
+
+bool LogFrameSource::may_give() {
+  if (firsts_.empty()) return false;
+  forget_past_seconds();
+  return !second_camera_ || !seconds_.empty() || firsts_.size() > kAhead;
+}
+
+void LogFrameSource::give(SourceFrame* frame) {
+  forget_past_seconds();
+  std::swap(image_, firsts_.front().image);
+  *frame = {firsts_.front().meta, &image_, nullptr};
+  spare_ = std::move(firsts_.front().image);
+  firsts_.pop_front();
+  if (!seconds_.empty() &&
+      seconds_.front().meta.utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {
+    std::swap(second_image_, seconds_.front().image);
+    seconds_.pop_front();
+    frame->second = &second_image_;
+  }
+  gave_image_ = true;
+  given_utime_ = frame->meta.utime;
 }
 
 // Once: the counts say how many follow.
@@ -108,6 +153,7 @@ void LogFrameSource::take_calibration(const calibration_t& calibration) {
       throw InputError(name_ + ": " + error.what());
     }
     calibration_ = calibration;
+    second_camera_ = second_camera(calibration, config_.camera);
     return;
   }
   if (calibration_hash(calibration) == calibration_hash(*calibration_)) return;

@@ -29,6 +29,7 @@ class LogFrameSource final : public FrameSource {
   // `feed` outlives its use.
   void feed_to(MeasurementFeed* feed);
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
+  void swap_second(ipc::GreyImage* image) override { std::swap(*image, second_image_); }
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
   [[nodiscard]] double progress() const override;
@@ -42,6 +43,17 @@ class LogFrameSource final : public FrameSource {
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
+  // An image that was decoded and not given yet.
+  struct Decoded {
+    drivers::CameraFrame meta;
+    ipc::GreyImage image;
+  };
+
+  void take(const drivers::LogItem& item, StageClock* clock);
+  void decode(const drivers::LogItem& item, StageClock* clock, std::deque<Decoded>* out);
+  void forget_past_seconds();
+  [[nodiscard]] bool may_give();
+  void give(SourceFrame* frame);
   void take_calibration(const calibration_t& calibration);
   void feed(const drivers::LogItem& item);
   void say_undecodable(ipc::ImageStatus status);
@@ -63,6 +75,13 @@ class LogFrameSource final : public FrameSource {
   std::deque<wheels_t> early_wheels_;
   std::int64_t given_utime_ = 0;  // of the last image of next()
   ipc::GreyImage image_;
+  // With a second camera an image waits for its partner until a later one of that camera, or kAhead more of
+  // its own have come: the log's reader holds a doubtful image for one period.
+  static constexpr std::size_t kAhead = 2;
+  std::optional<int> second_camera_;
+  std::deque<Decoded> firsts_, seconds_;
+  ipc::GreyImage second_image_, spare_;
+  bool ended_ = false;
   double file_bytes_ = -1.0;
   std::uint64_t offset_ = 0;
 };

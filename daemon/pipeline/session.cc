@@ -143,7 +143,7 @@ void Session::publish_landmarks() {
 
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
                                       Outputs* outputs, bool with_schedule, bool keep_times) {
-  slam::Rig rig = make_rig(calibration, config.camera.index);
+  slam::Rig rig = make_rig(calibration, config.camera);
   read_masks(config.camera, calibration, &rig);
   outputs->set_body_is_camera(calibration.body_name.empty());
   try {

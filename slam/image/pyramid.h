@@ -45,6 +45,8 @@ class PyramidImage final : public FrameImage {
   [[nodiscard]] bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const override;
   [[nodiscard]] Alignment align(const Patch& host, const Eigen::Matrix2f& A_target_host,
                                 const Eigen::Vector2f& predicted_px, float max_shift_px) const override;
+  [[nodiscard]] bool correlate(const Patch& host, const Eigen::Matrix2f& A_target_host,
+                               std::span<const Eigen::Vector2f> pixels, std::span<float> zncc) const override;
 
  private:
   const Pyramid* pyramid_ = nullptr;

@@ -17,6 +17,7 @@ struct MapJudgement {
   static constexpr double kSteadyChange = 0.02;
 
   bool steady = false;                    // the unit has held once
+  bool metric = false;                    // map units are metres
   bool sound = true;                      // the last adjustment
   bool calibration_contradicted = false;  // the images ask for a calibration far from the given one
   double sound_s = kSoundTime_s;          // time of sound adjustments up to adjusted_utime

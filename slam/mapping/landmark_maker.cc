@@ -71,6 +71,7 @@ void LandmarkMaker::process(KeyframeHandle newer, const std::vector<KeyframeHand
 
 void LandmarkMaker::pair_views(Observer newer, Observer older) {
   if (!view_of(older).has_pixels() || !view_of(newer).has_pixels()) return;
+  if (!view_of(older).has_corners() || !view_of(newer).has_corners()) return;
   const PairGeometry geometry = relate(newer, older);
   if (!geometry.valid) return;
   find_pairs(newer, older, geometry, &pairs_);

@@ -15,6 +15,11 @@ void Settling::start_map() {
   has_adjustment_ = false;
 }
 
+void Settling::start_metric_map() {
+  judgement_.metric = judgement_.steady = true;
+  steady_run_ = kSteadyRun;
+}
+
 void Settling::note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
                                bool calibration_contradicted, std::int64_t utime) {
   soundness_ = soundness;

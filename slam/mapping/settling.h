@@ -21,6 +21,8 @@ class Settling {
 
   // A new map is unsteady. The time of sound adjustments goes on: what bends one map bends the next.
   void start_map();
+  // The new map's unit is given: it holds from the start, unless an unsound adjustment came before.
+  void start_metric_map();
 
   // Takes in one adjustment, whose newest keyframe is of `utime`. `scale_change`: median factor of the
   // inverse depths; nothing is judged without it. An unsound adjustment or a contradicted calibration makes
@@ -29,6 +31,8 @@ class Settling {
                        bool calibration_contradicted, std::int64_t utime);
 
   [[nodiscard]] const MapJudgement& judgement() const { return judgement_; }
+  // Whether map units are metres.
+  [[nodiscard]] bool metric() const { return judgement_.metric; }
   // Of the last adjustment of this map; zeros before the first.
   [[nodiscard]] const Soundness& soundness() const { return soundness_; }
   // Whether the map is good enough to refine the calibration from.

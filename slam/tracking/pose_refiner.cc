@@ -56,10 +56,11 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   matcher_.align(frame);
   out.matches = static_cast<int>(matcher_.matches().size());
   if (out.matches < config_.min_matches / 2) return out;
+  matcher_.measure_further(frame, T_world_body_start);
   const PoseSolution s = solve(T_world_body_start, prior);
   out.T_world_body = s.T_world_body;
   out.covariance = s.covariance;
-  out.inliers = s.inliers;
+  out.inliers = s.inliers - further_inliers();
   out.rms = s.rms;
   count_inliers(&out);
   out.ok = s.ok && s.inliers >= config_.min_inliers / 2;
@@ -67,8 +68,16 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   return out;
 }
 
+// A landmark counts once, however many cameras measure it.
+int PoseRefiner::further_inliers() const {
+  const auto& matches = matcher_.matches();
+  return static_cast<int>(
+      std::count_if(matches.begin(), matches.end(), [](const Match& m) { return m.further && m.inlier; }));
+}
+
 void PoseRefiner::count_inliers(TrackOutcome* outcome) const {
   for (const Match& m : matcher_.matches()) {
+    if (m.further) continue;
     const ViewLandmark& l = matcher_.landmark_of(m);
     if (l.confirmed) ++outcome->confirmed_matches;
     if (!m.inlier) continue;
