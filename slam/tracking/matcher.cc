@@ -173,7 +173,7 @@ bool Matcher::align_one(const Frame& frame, const Prediction& prediction, Match*
 }
 
 void Matcher::measure_further(const Frame& frame, const SE3& T_world_body) {
-  if (frame.views.size() < 2 || !view_->metric) return;
+  if (frame.views.size() < 2 || !view_->judgement.metric) return;
   const StageSpan span(listener_, Stage::kAlignment);
   const std::size_t matches = matches_.size();
   for (int c = 1; c < frame.views.size(); ++c)
