@@ -5,6 +5,7 @@
 
 #include "daemon/system/side_functions.h"
 #include "ipc/channels.h"
+#include "ipc/reason.h"
 #include "tests/daemon/output/published.h"
 
 namespace farpoint::daemon {
@@ -73,6 +74,19 @@ TEST_F(FrameReporterTest, TheStatusComesAtItsRateAndAtEachChangeOfState) {
   EXPECT_EQ(status[1].frames_valid, 10);
   EXPECT_EQ(status[1].memory_pool_bytes, 4321);
   EXPECT_EQ(status[1].build, "build");
+}
+
+TEST_F(FrameReporterTest, TheStatusSaysWhyNoPoseIsValid) {
+  FramePackage p = package(0, 0, 0);
+  p.result.state = slam::State::kInitialising;
+  p.result.refusal = {slam::Reason::kLittleParallax, 0.004, 0.0175};
+  report(p);
+  const auto status = kept_.of<status_t>(ipc::kStatusChannel);
+  ASSERT_EQ(status.size(), 1U);
+  EXPECT_EQ(status[0].reason, static_cast<int>(ipc::Reason::kLittleParallax));
+  EXPECT_EQ(status[0].reason_value, 0.004);
+  EXPECT_EQ(status[0].reason_wanted, 0.0175);
+  EXPECT_EQ(status[0].message, "waiting for sideways motion: 0.0040 of 0.0175 rad");
 }
 
 TEST_F(FrameReporterTest, TheStatusHasTheCountsOfEstimatorMappingAndInput) {
