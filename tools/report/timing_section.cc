@@ -83,7 +83,7 @@ std::vector<Eigen::Vector2d> tracking_points(const RunRecord& run) {
   return points;
 }
 
-// Steps a run over one axis of times, nearly to the longest one. `label`: of a run with its times.
+// One line of steps a run; the axis ends near the longest time. `label`: text of a run, from its times.
 template <typename Times, typename Label>
 std::string time_histogram(const Runs& runs, const char* title, const char* axis, Times&& times_of,
                            Label&& label) {
