@@ -10,6 +10,7 @@
 #include "slam/image/extractor.h"
 #include "slam/map/refusal.h"
 #include "slam/mapping/counts.h"
+#include "slam/uncertainty.h"
 
 namespace farpoint::slam {
 
@@ -76,7 +77,10 @@ struct FrameResult {
   SE3 T_odom_body;  // continuous: integrates relative motion, never jumps
   Sim3 map_from_odom;
   Vector6d velocity_body = Vector6d::Zero();  // m/s (odom units/s), rad/s in body axes
-  Matrix6d covariance = Matrix6d::Zero();     // of T_map_body, order (translation, rotation), body axes
+  // Order (translation, rotation), body axes; NaN where unknown.
+  Matrix6d covariance = unknown_covariance();           // of T_map_body against the map
+  Matrix6d velocity_covariance = unknown_covariance();  // of velocity_body
+  OdometryErrors odometry;                              // of T_odom_body
   Refusal refusal;                            // why the pose is not valid
   int quality = -1;                           // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;

@@ -39,6 +39,7 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       tracker_(config, static_cast<int>(rig.cameras.size())),
       port_(config.mapping, rings),
       odometry_(config.odometry),
+      uncertainty_(rig),
       repeated_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept) {
@@ -189,6 +190,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
   ++map_id_;
   ++counts_.maps;
   odometry_.begin_map();
+  uncertainty_.begin_map();
   recovery_.begin_map();
   validity_.begin_map();
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
@@ -335,6 +337,7 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
   fill_pose(outcome.T_world_body, outcome.covariance);
+  note_errors();
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
   last_outcome_ = outcome;
   standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime,
@@ -443,7 +446,21 @@ void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
   result_.velocity_body = tracker_.velocity_body();
   result_.velocity_body.head<3>() /= result_.map_from_odom.scale;
-  result_.covariance = covariance;
+  fill_errors();
+}
+
+// Of a pose that adds a frame's motion. One that is held adds none.
+void FrontEnd::note_errors() {
+  const LocalView& view = *tracker_.view();
+  uncertainty_.advance(result_.T_odom_body, tracker_.pose_errors(), result_.map_from_odom.scale, view.sequence,
+                       view.judgement.metric);
+  fill_errors();
+}
+
+void FrontEnd::fill_errors() {
+  const PoseErrors& errors = tracker_.pose_errors();
+  result_.covariance = errors.known ? errors.noise : unknown_covariance();
+  result_.odometry = uncertainty_.errors();
 }
 
 std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const {

@@ -25,6 +25,7 @@
 #include "slam/tracking/keyframe_policy.h"
 #include "slam/tracking/repeated_features.h"
 #include "slam/tracking/tracker.h"
+#include "slam/uncertainty.h"
 #include "slam/validity.h"
 
 namespace farpoint::slam {
@@ -97,6 +98,8 @@ class FrontEnd {
   void pose_waiting_frames();
   void fill_map_state();
   void fill_pose(const SE3& T_map_body, const Matrix6d& covariance);
+  void note_errors();
+  void fill_errors();
   [[nodiscard]] RecordedFrame relative_to_reference(const Frame& frame, const TrackOutcome& outcome) const;
   void record(const RecordedFrame& frame);
 
@@ -107,6 +110,7 @@ class FrontEnd {
   MappingPort port_;
   Recovery recovery_;
   Odometry odometry_;
+  Uncertainty uncertainty_;
   Standstill standstill_;
   RepeatedFeatures repeated_;
   double repeated_share_ = 0;  // of the present frame

@@ -83,11 +83,18 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
 slam::FrameResult FrameReporter::since_odom_reset(const slam::FrameResult& result) {
   if (result.has_pose && reset_odom_.exchange(false, std::memory_order_relaxed)) {
     T_odom_start_ = result.T_odom_body;
+    drift_start_ = result.odometry.drift - slam::carried(T_odom_start_, result.odometry.noise);
+    drift_resets_ = result.reset_counter;
     ++odom_resets_;
   }
   if (odom_resets_ == 0) return result;
   slam::FrameResult r = result;
   r.T_odom_body = T_odom_start_.inverse() * result.T_odom_body;
+  // The drift of a map that began later begins with it.
+  const slam::Matrix6d before = result.reset_counter == drift_resets_ && drift_start_.allFinite()
+                                    ? drift_start_
+                                    : slam::Matrix6d::Zero();
+  r.odometry.drift = slam::carried(T_odom_start_.inverse(), result.odometry.drift - before);
   // What the map frame says stays as it is: map_from_odom takes up the difference.
   const slam::Sim3& S = result.map_from_odom;
   r.map_from_odom = {S.scale, (S.q * T_odom_start_.q).normalized(), S * T_odom_start_.t};

@@ -59,6 +59,8 @@ class FrameReporter {
   FrameOutput frame_;
   std::atomic<bool> reset_odom_{false};
   slam::SE3 T_odom_start_;  // of the last reset
+  slam::Matrix6d drift_start_ = slam::Matrix6d::Zero();  // until it, of the map of the counter below
+  std::uint32_t drift_resets_ = 0;
   std::uint32_t odom_resets_ = 0;
   FramePackage silence_;  // what the last frame said, without its pose
   status_t status_{};     // its texts are set once

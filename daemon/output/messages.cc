@@ -32,6 +32,18 @@ void set_matrix(const slam::Matrix6d& m, double (*rows)[6]) {
   }
 }
 
+void set_covariances(const FrameOutput& frame, odometry_t* m) {
+  const slam::FrameResult& r = frame.result;
+  const auto set = [&](const slam::Matrix6d& covariance, double(*rows)[6]) {
+    set_matrix(frame.valid ? covariance : slam::unknown_covariance(), rows);
+  };
+  set(r.odometry.since_reset(r.T_odom_body), m->pose_covariance);
+  set(r.velocity_covariance, m->twist_covariance);
+  set(r.odometry.noise, m->noise_covariance);
+  set(r.odometry.drift, m->drift_covariance);
+  m->scale_sigma = frame.valid ? r.odometry.scale_sigma : kNan;
+}
+
 std::int8_t quality_of(const FrameOutput& frame) {
   return static_cast<std::int8_t>(frame.valid ? std::clamp(frame.result.quality, -1, 100) : -1);
 }
@@ -111,9 +123,7 @@ odometry_t make_odometry(const FrameOutput& frame) {
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNan);
   set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
   set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
-  // The estimator's covariance is many times smaller than the error of odom: none is given.
-  set_matrix(slam::Matrix6d::Constant(kNan), m.pose_covariance);
-  set_matrix(slam::Matrix6d::Constant(kNan), m.twist_covariance);
+  set_covariances(frame, &m);
   m.state = static_cast<std::int8_t>(r.state);
   m.scale_state = static_cast<std::int8_t>(r.scale);
   m.quality = quality_of(frame);

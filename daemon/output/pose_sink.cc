@@ -2,17 +2,10 @@
 #include "daemon/output/pose_sink.h"
 
 #include <cmath>
+#include <limits>
 
 namespace farpoint::daemon {
 namespace {
-
-// The covariance of (translation, rotation) when the unit of length shrinks by `scale`.
-slam::Matrix6d scaled_covariance(const slam::Matrix6d& covariance, double scale) {
-  slam::Matrix6d scaled = covariance;
-  scaled.topRows<3>() *= scale;
-  scaled.leftCols<3>() *= scale;
-  return scaled;
-}
 
 bool finite(const slam::FrameResult& r) {
   return r.T_map_body.is_finite() && r.T_odom_body.is_finite() && r.velocity_body.allFinite() &&
@@ -32,7 +25,9 @@ FrameOutput make_frame_output(const slam::FrameResult& result, double assumed_sc
   r.T_odom_body.t *= assumed_scale;
   r.map_from_odom.t *= assumed_scale;  // both frames change their unit: the ratio between them stays
   r.velocity_body.head<3>() *= assumed_scale;
-  r.covariance = scaled_covariance(r.covariance, assumed_scale);
+  for (slam::Matrix6d* m : {&r.covariance, &r.velocity_covariance, &r.odometry.noise, &r.odometry.drift})
+    *m = slam::in_unit(*m, assumed_scale);
+  r.odometry.scale_sigma = std::numeric_limits<double>::quiet_NaN();  // none is given with the key
   return output;
 }
 

@@ -28,6 +28,9 @@ class PoseRefiner {
   // aligns all, and solves as above.
   TrackOutcome refine(const Frame& frame, const SE3& T_world_body_start, const PosePrior& prior = {});
 
+  // What the last solve() took, in the order of the matches.
+  [[nodiscard]] const std::vector<PoseMeasurement>& measurements() const { return measurements_; }
+
   // Bytes of the work space.
   [[nodiscard]] std::size_t bytes() const;
 

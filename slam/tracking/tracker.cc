@@ -23,7 +23,10 @@ Tracker::Tracker(const EstimatorConfig& config, int cameras)
       matcher_(config, cameras),
       refiner_(config, &matcher_, cameras),
       relocaliser_(config, &matcher_, &refiner_),
-      counter_(static_cast<std::size_t>(config.capacity.landmarks)) {
+      counter_(static_cast<std::size_t>(config.capacity.landmarks)),
+      errors_(static_cast<std::size_t>(config.capacity.landmarks),
+              static_cast<std::size_t>(cameras) * static_cast<std::size_t>(config.extractor.features),
+              static_cast<std::size_t>(config.capacity.view_landmarks)) {
   const auto features =
       static_cast<std::size_t>(cameras) * static_cast<std::size_t>(config.extractor.features);
   reserve_touched(&last_seen_, features);
@@ -37,7 +40,7 @@ void Tracker::listen(StageListener* listener) {
 }
 
 std::size_t Tracker::bytes() const {
-  return matcher_.bytes() + refiner_.bytes() + relocaliser_.bytes() + counter_.bytes() +
+  return matcher_.bytes() + refiner_.bytes() + relocaliser_.bytes() + counter_.bytes() + errors_.bytes() +
          capacity_bytes(last_seen_) + capacity_bytes(confirmed_seen_);
 }
 
@@ -59,6 +62,7 @@ void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
   confirmed_seen_.clear();
   matcher_.set_view(nullptr);
   counter_.clear();
+  errors_.begin_map();
 }
 
 TrackOutcome Tracker::track(const Frame& frame) {
@@ -122,6 +126,7 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
 
 void Tracker::accept(const Frame& frame, const TrackOutcome& outcome) {
   motion_.accept(outcome.T_world_body, frame.utime);
+  errors_.measure(outcome.T_world_body, matcher_, refiner_.measurements());
   note_seen();
   confirmed_seen_.assign(last_seen_.begin(), last_seen_.end());
 }

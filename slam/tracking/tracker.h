@@ -16,6 +16,7 @@
 #include "slam/stages.h"
 #include "slam/tracking/constant_velocity.h"
 #include "slam/tracking/matcher.h"
+#include "slam/tracking/pose_errors.h"
 #include "slam/tracking/pose_refiner.h"
 #include "slam/tracking/relocaliser.h"
 #include "slam/tracking/sighting_counter.h"
@@ -76,6 +77,9 @@ class Tracker {
   // Landmarks that the last accepted frame saw.
   void last_seen(std::vector<LandmarkHandle>* out) const { *out = last_seen_; }
 
+  // Of the last accepted pose.
+  [[nodiscard]] const PoseErrors& pose_errors() const { return errors_.errors(); }
+
   [[nodiscard]] const SE3& T_world_body() const { return motion_.newest().T_world_body; }
   [[nodiscard]] const std::vector<Match>& matches() const { return matcher_.matches(); }
   // Velocity between the last two accepted frames, body axes: translation (map units a second), rotation (rad
@@ -100,6 +104,7 @@ class Tracker {
   PoseRefiner refiner_;
   Relocaliser relocaliser_;
   SightingCounter counter_;
+  PoseErrorModel errors_;
   std::vector<LandmarkHandle> last_seen_;       // inliers of the last accepted frame
   std::vector<LandmarkHandle> confirmed_seen_;  // inliers of the last frame that was not on trial
 };
