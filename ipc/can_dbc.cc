@@ -85,16 +85,14 @@ Message classic_message(const CanLayout& layout, CanMessage message) {
 }
 
 Message fd_message(const CanLayout& layout) {
-  Message out{
-      file_id(layout, layout.base_id),
-      "FARPOINT_EPOCH",
-      "All of an epoch in one CAN FD frame. Standard deviations are not available: this version cannot tell "
-      "them honestly yet.",
-      kCanFdBytes,
-      cycle_ms(layout, 1),
-      5,
-      layout.fd_data_id(),
-      {}};
+  Message out{file_id(layout, layout.base_id),
+              "FARPOINT_EPOCH",
+              "All of an epoch in one CAN FD frame.",
+              kCanFdBytes,
+              cycle_ms(layout, 1),
+              5,
+              layout.fd_data_id(),
+              {}};
   out.signals = {{"CRC", 0, 16, false, 1, 0, 65535, "", 0, "",
                   "AUTOSAR E2E profile 5: CRC-16 0x1021, start 0xFFFF, over bytes 2..63, then Data ID low "
                   "byte, high byte."},

@@ -30,12 +30,10 @@ constexpr std::array<MessageInfo, kCanMessages> kMessages{{
     {"attitude", "FARPOINT_ATTITUDE", "Orientation of the body: R = Rz(Heading) Ry(Pitch) Rx(Roll)."},
     {"velocity", "FARPOINT_VELOCITY", "Velocity of the body in its own axes."},
     {"sigmas", "FARPOINT_POSITION_SIGMA",
-     "Standard deviations of the position. Not available: this version cannot tell them honestly yet."},
+     "Standard deviations of the position: its noise, and its drift since the reset in frame odom."},
     {"sigmas", "FARPOINT_ATTITUDE_SIGMA",
-     "Standard deviations of the orientation. Not available: this version cannot tell them honestly yet."},
-    {"sigmas", "FARPOINT_VELOCITY_SIGMA",
-     "Standard deviations of velocity and yaw rate. Not available: this version cannot tell them honestly "
-     "yet."},
+     "Standard deviations of the orientation: its noise, and its drift since the reset in frame odom."},
+    {"sigmas", "FARPOINT_VELOCITY_SIGMA", "Standard deviations of velocity and yaw rate."},
     {"diagnosis", "FARPOINT_DIAGNOSIS", "What the pose rests on. Changes rarely."},
 }};
 
@@ -148,14 +146,14 @@ constexpr std::array<CanSignalInfo, kCanSignals> kSignals{{
          "Whether z of the frame is up. No: roll and pitch are against the first pose, not against gravity.",
          3),
     code(M::kDiagnosis, "BodyIsCamera", 34, 2, 1, kYesNo,
-         "Whether the body stands at the camera, since the calibration names no body.", 3),
+         "Whether the body stands at the camera: the calibration names no body, or the scale is unknown.", 3),
     code(M::kDiagnosis, "ScaleSource", 36, 4, 14,
          "0 \"none\" 1 \"assumed\" 2 \"second camera\" 3 \"inertial\" 4 \"wheels\" 5 \"several\" "
          "6 \"loaded map\" 15 \"not available\"",
          "Where metres come from. 2 to 6 are reserved for later versions.", 15),
     magnitude(M::kDiagnosis, "ScaleSigma", 40, 12, 0.001, 4.093, "",
               "4094 \"more than 4.093\" 4095 \"not available\"",
-              "Standard deviation of the scale, relative. Reserved: not available in this version."),
+              "Standard deviation of the scale, relative. It comes on top of that of the position."),
     code(M::kDiagnosis, "Imu", 52, 3, 6, kSensor, "Inertial sensor. Reserved: none in this version.", 7),
     code(M::kDiagnosis, "Wheels", 55, 3, 6, kSensor,
          "Wheel speeds in the pose. Reserved: none in this version.", 7),

@@ -10,7 +10,7 @@
 #include "slam/image/extractor.h"
 #include "slam/map/refusal.h"
 #include "slam/mapping/counts.h"
-#include "slam/uncertainty.h"
+#include "slam/odometry_errors.h"
 
 namespace farpoint::slam {
 
@@ -76,13 +76,13 @@ struct FrameResult {
   SE3 T_map_body;
   SE3 T_odom_body;  // continuous: integrates relative motion, never jumps
   Sim3 map_from_odom;
-  Vector6d velocity_body = Vector6d::Zero();  // m/s (odom units/s), rad/s in body axes
+  Vector6d velocity_body = Vector6d::Zero();  // m/s (odom units/s), rad/s in body axes, at utime
   // Order (translation, rotation), body axes; NaN where unknown.
   Matrix6d covariance = unknown_covariance();           // of T_map_body against the map
   Matrix6d velocity_covariance = unknown_covariance();  // of velocity_body
   OdometryErrors odometry;                              // of T_odom_body
-  Refusal refusal;                            // why the pose is not valid
-  int quality = -1;                           // -1 unknown, 0..100
+  Refusal refusal;                                      // why the pose is not valid
+  int quality = -1;                                     // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;
   ScaleState scale = ScaleState::kUnknown;
   std::int32_t map_id = 0;
@@ -93,6 +93,7 @@ struct FrameResult {
   std::uint64_t job = 0;   // number of the last job sent to mapping by this frame; 0: none
   int jobs_under_way = 0;  // jobs waiting for mapping, and the one in work
 
+  [[nodiscard]] bool knows_velocity() const { return velocity_covariance.allFinite(); }
   // The velocity in map units a second.
   [[nodiscard]] Vector6d velocity_in_map() const {
     Vector6d velocity = velocity_body;

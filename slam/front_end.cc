@@ -444,16 +444,24 @@ void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
   if (tracker_.view() != nullptr && tracker_.view()->judgement.metric) result_.scale = ScaleState::kMetric;
   result_.T_odom_body = odometry_.T_odom_body();
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
-  result_.velocity_body = tracker_.velocity_body();
-  result_.velocity_body.head<3>() /= result_.map_from_odom.scale;
+  const double unit = 1.0 / result_.map_from_odom.scale;
+  result_.velocity_body = tracker_.velocity().velocity();
+  result_.velocity_body.head<3>() *= unit;
+  result_.velocity_covariance = in_unit(tracker_.velocity().covariance(), unit);
   fill_errors();
 }
 
 // Of a pose that adds a frame's motion. One that is held adds none.
 void FrontEnd::note_errors() {
   const LocalView& view = *tracker_.view();
-  uncertainty_.advance(result_.T_odom_body, tracker_.pose_errors(), result_.map_from_odom.scale, view.sequence,
-                       view.judgement.metric);
+  OdometryStep step;
+  step.T_odom_body = result_.T_odom_body;
+  step.utime = result_.utime;
+  step.map_units = result_.map_from_odom.scale;
+  step.correction = odometry_.correction();
+  step.view_sequence = view.sequence;
+  step.metric = view.judgement.metric;
+  uncertainty_.advance(step, tracker_.pose_errors());
   fill_errors();
 }
 

@@ -2,6 +2,7 @@
 #include "slam/odometry.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace farpoint::slam {
 
@@ -15,6 +16,11 @@ constexpr double kLongestStep_s = 0.25;
 SE3 in_unit(SE3 T, double factor) {
   T.t *= factor;
   return T;
+}
+
+// Of a length of 1 whose part is taken: root of the change of its square.
+double square_taken(double part) {
+  return std::sqrt(1.0 - (1.0 - part) * (1.0 - part));
 }
 
 double shortened(double length, double most) {
@@ -39,6 +45,7 @@ void Odometry::aim_at(const SE3& T_odom_body, const SE3& T_map_body) {
 }
 
 void Odometry::advance(const SE3& T_map_body, std::int64_t utime, double sigma) {
+  correction_.setZero();
   if (has_last_)
     T_odom_body_ = T_odom_body_ * in_unit(T_map_body_last_.inverse() * T_map_body, 1.0 / map_units_);
   T_map_body_last_ = T_map_body;
@@ -61,10 +68,12 @@ void Odometry::take_corrections(const SE3& T_map_body, std::int64_t utime, doubl
   const double time_s = std::min(1e-6 * static_cast<double>(utime - corrected_utime_), kLongestStep_s);
   const SE3 missing = T_odom_body_.inverse() * target(T_map_body);
   const Eigen::AngleAxisd turn(missing.q);
+  const double share = shortened(missing.t.norm(), config_.correction_share * way);
+  const double turn_share = shortened(turn.angle(), config_.correction_rad_per_s * time_s);
   SE3 step;
-  step.t = shortened(missing.t.norm(), config_.correction_share * way) * missing.t;
-  step.q = Eigen::AngleAxisd(turn.angle() * shortened(turn.angle(), config_.correction_rad_per_s * time_s),
-                             turn.axis());
+  step.t = share * missing.t;
+  step.q = Eigen::AngleAxisd(turn.angle() * turn_share, turn.axis());
+  correction_ << square_taken(share) * missing.t, square_taken(turn_share) * turn.angle() * turn.axis();
   T_odom_body_ = T_odom_body_ * step;
   T_odom_body_corrected_ = T_odom_body_;
   corrected_utime_ = utime;

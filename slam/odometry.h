@@ -28,6 +28,10 @@ class Odometry {
   // pose to the first of the new one is unknown.
   void begin_map();
 
+  // What the last advance() took of the map's corrections: squares of the parts taken one after another sum
+  // up to the square of what was missing. Order (translation, rotation), body axes.
+  [[nodiscard]] const Vector6d& correction() const { return correction_; }
+
   [[nodiscard]] const SE3& T_odom_body() const { return T_odom_body_; }
   // At this pose of the map.
   [[nodiscard]] Sim3 map_from_odom(const SE3& T_map_body) const;
@@ -49,6 +53,7 @@ class Odometry {
   // Place and time of the last correction taken: only motion beyond the noise since then allows another.
   SE3 T_odom_body_corrected_;
   std::int64_t corrected_utime_ = 0;
+  Vector6d correction_ = Vector6d::Zero();
   std::uint32_t resets_ = 0;
 };
 

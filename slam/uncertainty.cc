@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/uncertainty.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace farpoint::slam {
@@ -10,14 +11,16 @@ namespace {
 // Error that all alignments between the images of a pair have in common: of interpolation, and of the
 // calibration's field, which differs over the image. Level-0 pixels, 1 sigma.
 constexpr double kPairBias_px = 0.02;
-// Of the baseline as calibrated, relative: a millimetre a metre.
-constexpr double kBaselineSigma = 0.001;
+// Of the baseline as calibrated, relative: half a millimetre a metre.
+constexpr double kBaselineSigma = 0.0005;
+// The map's corrections swing to and fro: a part of each is drift, the rest takes an earlier one back.
+constexpr double kLastingCorrection = 0.15;
 
 }  // namespace
 
 Matrix6d OdometryErrors::since_reset(const SE3& T_odom_body) const {
-  Matrix6d covariance = carried(T_odom_body.inverse(), drift) + noise;
-  if (std::isnan(scale_sigma)) return covariance;
+  Matrix6d covariance = without_scale(T_odom_body);
+  if (!std::isfinite(scale_sigma)) return covariance;
   Vector6d way = Vector6d::Zero();
   way.head<3>() = T_odom_body.q.conjugate() * T_odom_body.t;
   covariance += scale_sigma * scale_sigma * way * way.transpose();
@@ -33,7 +36,6 @@ Uncertainty::Uncertainty(const Rig& rig) {
 void Uncertainty::begin_map() {
   errors_ = {};
   begun_ = false;
-  waiting_.setZero();
 }
 
 // A common error of the pair's angles is a common error of all inverse depths: the further landmarks the
@@ -42,24 +44,40 @@ double Uncertainty::scale_sigma(double holding_distance_m) const {
   return std::hypot(kBaselineSigma, pair_sigma_per_m_ * holding_distance_m);
 }
 
-void Uncertainty::advance(const SE3& T_odom_body, const PoseErrors& errors, double map_units,
-                          std::uint64_t view_sequence, bool metric) {
+void Uncertainty::advance(const OdometryStep& step, const PoseErrors& errors) {
   if (!errors.known) return;
-  const double unit = 1.0 / map_units;
+  const double unit = 1.0 / step.map_units;
   errors_.noise = in_unit(errors.noise, unit);
   errors_.scale_sigma =
-      metric ? scale_sigma(errors.holding_distance * unit) : std::numeric_limits<double>::infinity();
-  if (!begun_) {
-    errors_.drift = carried(T_odom_body, errors_.noise);
-  } else {
-    waiting_ += carried(T_odom_body, in_unit(errors.exchanged, unit));
-    if (view_sequence != view_sequence_) {
-      errors_.drift += waiting_;
-      waiting_.setZero();
-    }
-  }
+      step.metric ? scale_sigma(errors.holding_distance * unit) : std::numeric_limits<double>::infinity();
+  if (begun_)
+    grow(step, in_unit(errors.exchanged, unit));
+  else
+    begin(step);
+  view_sequence_ = step.view_sequence;
+  utime_ = step.utime;
+}
+
+void Uncertainty::begin(const OdometryStep& step) {
+  errors_.drift = carried(step.T_odom_body, errors_.noise);
+  errors_.drift_of_second.setZero();
+  waiting_.setZero();
   begun_ = true;
-  view_sequence_ = view_sequence;
+}
+
+void Uncertainty::grow(const OdometryStep& step, const Matrix6d& exchanged) {
+  constexpr double kSecond_s = 1.0;
+  const Matrix6d correction = kLastingCorrection * step.correction * step.correction.transpose();
+  waiting_ += carried(step.T_odom_body, exchanged);
+  Matrix6d growth = carried(step.T_odom_body, correction);
+  if (step.view_sequence != view_sequence_) {
+    growth += waiting_;
+    waiting_.setZero();
+  }
+  errors_.drift += growth;
+  const double time_s = 1e-6 * static_cast<double>(step.utime - utime_);
+  errors_.drift_of_second *= 1.0 - std::clamp(time_s / kSecond_s, 0.0, 1.0);
+  errors_.drift_of_second += growth;
 }
 
 }  // namespace farpoint::slam

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "daemon/output/attitude.h"
 #include "daemon/output/extrapolation.h"
 #include "daemon/output/reasons.h"
 
@@ -24,6 +25,28 @@ void set_pose(const FrameOutput& frame, ipc::OdometryEpoch* epoch) {
   const slam::Vector6d velocity = epoch->map_frame ? r.velocity_in_map() : r.velocity_body;
   epoch->velocity_m_s = {velocity[0], velocity[1], velocity[2]};
   epoch->yaw_rate_rad_s = velocity[5];
+}
+
+// Standard deviations of what set_pose() puts in.
+void set_sigmas(const FrameOutput& frame, ipc::OdometryEpoch* epoch) {
+  const slam::FrameResult& r = frame.result;
+  const slam::SE3& T = epoch->map_frame ? r.T_map_body : r.T_odom_body;
+  const slam::Matrix6d pose = epoch->map_frame ? r.covariance : r.odometry.without_scale(r.T_odom_body);
+  const Eigen::Matrix3d R = T.rotation();
+  const Eigen::Vector3d position = (R * pose.topLeftCorner<3, 3>() * R.transpose()).diagonal().cwiseSqrt();
+  epoch->sigma_position_m = {position.x(), position.y(), position.z()};
+  if (const auto d_angles = d_angles_d_rotation(R)) {
+    const Eigen::Vector3d angles =
+        (*d_angles * pose.bottomRightCorner<3, 3>() * d_angles->transpose()).diagonal().cwiseSqrt();
+    epoch->sigma_roll_rad = angles.x();
+    epoch->sigma_pitch_rad = angles.y();
+    epoch->sigma_heading_rad = angles.z();
+  }
+  slam::Vector6d velocity = r.velocity_covariance.diagonal().cwiseSqrt();
+  if (epoch->map_frame) velocity.head<3>() *= r.map_from_odom.scale;
+  epoch->sigma_velocity_m_s = {velocity[0], velocity[1], velocity[2]};
+  epoch->sigma_yaw_rate_rad_s = velocity[5];
+  epoch->scale_sigma = r.odometry.scale_sigma;
 }
 
 ipc::CanScaleSource scale_source(slam::ScaleState scale) {
@@ -83,6 +106,9 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
   const slam::FrameResult& r = last_.result;
   epoch.scale_state = static_cast<std::uint8_t>(r.scale);
   epoch.scale_source = scale_source(r.scale);
+  // A map of unknown unit has no place for the lever arm.
+  if (r.scale == slam::ScaleState::kUnknown && body_is_camera_ == ipc::CanYesNo::kNo)
+    epoch.body_is_camera = ipc::CanYesNo::kYes;
   const std::int64_t age_us = std::max<std::int64_t>(now_us - image_us_, 0);
   const bool in_time = !has_image_ || age_us <= kLongest_us;
   if (has_image_) epoch.age_s = kMicro * static_cast<double>(age_us);
@@ -90,11 +116,14 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
   if (!in_time && slam::is_valid(r.state)) epoch.state = ipc::kCanStateLost;
   if (!last_.valid || !in_time || !has_image_) return epoch;
 
-  epoch.pose_valid = epoch.velocity_valid = true;
+  epoch.pose_valid = true;
+  epoch.velocity_valid = r.knows_velocity();
   epoch.from_vision = r.has_pose && age_us <= frame_period_us();
   epoch.predicted = age_us > 0;
   epoch.quality = r.quality;
-  set_pose(extrapolate(last_, epoch.age_s), &epoch);
+  const FrameOutput now = extrapolate(last_, epoch.age_s);
+  set_pose(now, &epoch);
+  set_sigmas(now, &epoch);
   return epoch;
 }
 

@@ -55,7 +55,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   {
     const StageScope scope(&package->clock, timing_t::STAGE_OUTPUT);
     silence_.result = since_odom_reset(result);
-    frame_ = make_frame_output(silence_.result, assumed_scale_);
+    frame_ = make_output(silence_.result);
     frame_.age_us = package->chance.age_us;
     frame_.calibration_contradicted = package->counts.mapping.calibration_contradicted;
     frame_.boot_counter = status_.boot_counter;
@@ -78,6 +78,15 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
         package->clock.message(result.utime, result.sequence, package->chance.age_us, deadline_ms_));
   }
   return frame_;
+}
+
+FrameOutput FrameReporter::make_output(const slam::FrameResult& result) {
+  const FrameOutput output = make_frame_output(result, assumed_scale_of(result.map_id), lever_m_);
+  if (output.valid && output.result.scale == slam::ScaleState::kAssumed && assumed_map_ < 0) {
+    assumed_map_ = result.map_id;
+    maps_->assume_scale_of(assumed_map_);
+  }
+  return output;
 }
 
 slam::FrameResult FrameReporter::since_odom_reset(const slam::FrameResult& result) {
@@ -112,7 +121,7 @@ const FrameOutput& FrameReporter::report_silence(std::int64_t utime, std::int64_
   r.features = r.matches = r.inliers = r.aligned = 0;
   r.keyframe = false;
   silence_.in = in;
-  frame_ = make_frame_output(r, assumed_scale_);
+  frame_ = make_output(r);
   frame_.age_us = age_us;
   frame_.boot_counter = status_.boot_counter;
   frame_.age_at_s = 1e-6 * static_cast<double>(utime);

@@ -34,6 +34,15 @@ class FrameReporter {
                                     const OutputCounts& out);
   // Before the first frame. See realtime.deadline_ms.
   void set_deadline(double deadline_ms) { deadline_ms_ = deadline_ms; }
+  // Before the first frame. Where the estimator's body stands in maps of unknown unit; make_frame_output().
+  void set_lever(const Eigen::Vector3d& lever_m) { lever_m_ = lever_m; }
+  // Metres a unit of the map of this number, by scale.assumed: that of the first map with a valid pose, since
+  // another map's unit is another. 0: none is assumed.
+  [[nodiscard]] double assumed_scale_of(std::int32_t map_id) const {
+    return assumed_map_ < 0 || map_id == assumed_map_ ? assumed_scale_ : 0.0;
+  }
+  // A valid pose in units of scale.assumed went out.
+  [[nodiscard]] bool assumes_scale() const { return assumed_map_ >= 0; }
   // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.
   void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
   // Any thread.
@@ -46,9 +55,12 @@ class FrameReporter {
   [[nodiscard]] slam::FrameResult since_odom_reset(const slam::FrameResult& result);
   void fill_status(const FramePackage& package, const OutputCounts& out);
   void note_state(const slam::FrameResult& result);
+  [[nodiscard]] FrameOutput make_output(const slam::FrameResult& result);
 
   std::atomic<double> status_rate_hz_;
   const double assumed_scale_;
+  std::int32_t assumed_map_ = -1;  // -1: no valid pose yet
+  Eigen::Vector3d lever_m_ = Eigen::Vector3d::Zero();
   double deadline_ms_;
   const int features_;  // as configured
   const bool with_schedule_;
@@ -58,7 +70,7 @@ class FrameReporter {
 
   FrameOutput frame_;
   std::atomic<bool> reset_odom_{false};
-  slam::SE3 T_odom_start_;  // of the last reset
+  slam::SE3 T_odom_start_;                               // of the last reset
   slam::Matrix6d drift_start_ = slam::Matrix6d::Zero();  // until it, of the map of the counter below
   std::uint32_t drift_resets_ = 0;
   std::uint32_t odom_resets_ = 0;

@@ -2,6 +2,7 @@
 // FARPOINT_MAP on its way from mapping, the only thread that may read the map, to the output.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -22,6 +23,10 @@ class MapBoard {
 
   // Mapping's thread.
   void note(const slam::Inspection& inspection, const slam::MappingNote& note);
+  // Before the first frame: as FrameReporter::set_lever().
+  void set_lever(const Eigen::Vector3d& lever_m) { lever_m_ = lever_m; }
+  // Any thread. scale.assumed holds for the map of this number alone.
+  void assume_scale_of(std::int32_t map_id) { assumed_map_.store(map_id, std::memory_order_relaxed); }
   // The output's thread.
   void publish_known(std::uint64_t replies_taken, Publisher* publisher);
 
@@ -36,6 +41,8 @@ class MapBoard {
 
   const double rate_hz_, assumed_scale_;
   const int points_;
+  std::atomic<std::int32_t> assumed_map_{-1};  // -1: every map
+  Eigen::Vector3d lever_m_ = Eigen::Vector3d::Zero();
   std::int64_t next_utime_;
   slam::SpscRing<Sheet> sheets_;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/output/attitude.h"
 #include "daemon/output/epoch_predictor.h"
 
 namespace farpoint::daemon {
@@ -29,20 +30,6 @@ Matrix6d turned(const Matrix6d& covariance, const Eigen::Matrix3d& of_translatio
   J.topLeftCorner<3, 3>() = of_translation;
   J.bottomRightCorner<3, 3>() = of_rotation;
   return J * covariance * J.transpose();
-}
-
-// Derivatives of roll, pitch and yaw (R = Rz(yaw) Ry(pitch) Rx(roll)) by a small rotation about the body's
-// axes. Nothing near a pitch of a quarter turn, where they have none.
-std::optional<Eigen::Matrix3d> d_angles_d_rotation(const Eigen::Matrix3d& R) {
-  const double sin_pitch = -R(2, 0), cos_pitch = std::hypot(R(2, 1), R(2, 2));
-  constexpr double kLeastCosine = 0.02;  // within a degree of straight up or down
-  if (cos_pitch < kLeastCosine) return std::nullopt;
-  const double sin_roll = R(2, 1) / cos_pitch, cos_roll = R(2, 2) / cos_pitch;
-  Eigen::Matrix3d J;
-  J << 1, sin_roll * sin_pitch / cos_pitch, cos_roll * sin_pitch / cos_pitch,  //
-      0, cos_roll, -sin_roll,                                                  //
-      0, sin_roll / cos_pitch, cos_roll / cos_pitch;
-  return J;
 }
 
 Triangle triangle_of(const Matrix6d& m) {

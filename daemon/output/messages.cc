@@ -121,14 +121,15 @@ odometry_t make_odometry(const FrameOutput& frame) {
   m.sequence = r.sequence;
   set_pose(known(r.has_pose, r.T_odom_body), m.position, m.orientation);
   const Eigen::Vector3d unknown = Eigen::Vector3d::Constant(kNan);
-  set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
-  set_vector(frame.valid ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
+  const bool moves = frame.valid && r.knows_velocity();
+  set_vector(moves ? Eigen::Vector3d(r.velocity_body.head<3>()) : unknown, m.velocity);
+  set_vector(moves ? Eigen::Vector3d(r.velocity_body.tail<3>()) : unknown, m.angular_velocity);
   set_covariances(frame, &m);
   m.state = static_cast<std::int8_t>(r.state);
   m.scale_state = static_cast<std::int8_t>(r.scale);
   m.quality = quality_of(frame);
   m.valid = frame.valid ? 1 : 0;
-  m.velocity_valid = m.valid;
+  m.velocity_valid = moves ? 1 : 0;
   m.from_vision = r.has_pose ? 1 : 0;
   m.map_id = r.map_id;
   m.reset_counter = static_cast<std::int32_t>(r.reset_counter);

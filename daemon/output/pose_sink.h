@@ -23,7 +23,11 @@ struct FrameOutput {
 
 // The estimator's result with scale.assumed applied (0: none) and its validity decided. A result that is
 // marked valid but holds a number that is not finite is taken for invalid: nothing wrong goes out as valid.
-[[nodiscard]] FrameOutput make_frame_output(const slam::FrameResult& result, double assumed_scale);
+// `lever_m`: the estimator's body in the body's axes, from the body's origin; a map of unknown unit cannot
+// hold it, so that the estimator's body stands at the camera. With the assumed scale the result is the
+// body's.
+[[nodiscard]] FrameOutput make_frame_output(const slam::FrameResult& result, double assumed_scale,
+                                            const Eigen::Vector3d& lever_m = Eigen::Vector3d::Zero());
 
 // Receives every frame in order. Errors of the outside (no route, bus off) are counted, never thrown.
 class PoseSink {

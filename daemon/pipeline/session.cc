@@ -47,6 +47,14 @@ void print_calibration(const slam::CalibrationInfo& c) {
         std::exp(c.focal_scale_of_images));
 }
 
+// The body's places instead of the camera's, which is at `lever` on it; map units.
+void move_body(const Eigen::Vector3d& lever, RunEnd* end) {
+  for (slam::MapTrajectory& map : end->trajectories)
+    for (slam::PosedFrame& frame : map.frames) frame.T_map_body.t += lever - frame.T_map_body.q * lever;
+  for (slam::LandmarkInfo& landmark : end->landmarks)
+    for (Eigen::Vector3d* p : {&landmark.position_map, &landmark.anchor_map}) *p += lever;
+}
+
 }  // namespace
 
 Session::Session(const Config& config, const slam::Rig& rig, Options options, std::vector<PoseSink*> sinks,
@@ -63,6 +71,10 @@ Session::Session(const Config& config, const slam::Rig& rig, Options options, st
   print_memory_table(table, pool_bytes_);
   reporter_ = std::make_unique<FrameReporter>(config, names_, std::move(sinks), publisher, &maps_,
                                               static_cast<std::int64_t>(pool_bytes_), options.with_schedule);
+  // The body of a rig of several cameras stays in its place.
+  if (rig.cameras.size() == 1) lever_m_ = rig.cameras.front().T_body_camera.t;
+  reporter_->set_lever(lever_m_);
+  maps_.set_lever(lever_m_);
   if (publisher->has_sinks())
     estimator_.on_view([this](const slam::MappingNote& note) { maps_.note(estimator_.inspect(), note); });
 }
@@ -107,7 +119,8 @@ void Session::summarise_maps() {
   const slam::Inspection maps = estimator_.inspect();
   end.trajectories = maps.trajectories();
   end.landmarks = maps.landmarks();
-  end.unit_scale = end.last.scale == slam::ScaleState::kAssumed ? config_.scale.assumed : 1.0;
+  end.unit_scale = reporter_->assumes_scale() ? config_.scale.assumed : 1.0;
+  if (reporter_->assumes_scale()) move_body(lever_m_ / end.unit_scale, &end);
   end.observation_distances.assign(end.trajectories.size(), {});
   maps.visit_observation_distances([&](std::int32_t map_id, double distance) {
     for (std::size_t i = 0; i < end.trajectories.size(); ++i) {

@@ -70,6 +70,8 @@ class Session {
   std::size_t pool_bytes_ = 0;
   Publisher* publisher_;
   std::unique_ptr<FrameReporter> reporter_;
+  // Of the camera on the body, where the estimator's body is the camera.
+  Eigen::Vector3d lever_m_ = Eigen::Vector3d::Zero();
   FramePackage package_;  // of process()
   RunTally tally_;
 };

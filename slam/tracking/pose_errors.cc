@@ -17,7 +17,9 @@ namespace {
 constexpr double kPatchesAsOne = 4.0;
 // The depths of one frame's landmarks come from few keyframes, whose places they share. Against those of
 // landmarks in use they average less.
-constexpr double kDepthsAsOne = 1.0, kExchangedDepthsAsOne = 25.0;
+constexpr double kDepthsAsOne = 1.0, kExchangedDepthsAsOne = 16.0;
+// No measurement is better than a tenth of its claimed sigma: what is left over of it is not seen.
+constexpr double kLeastVariance = 0.01;
 // Frames over which the variances are averaged.
 constexpr int kLearning = 20;
 // Fewest landmarks seen twice in a row that say something of the variances.
@@ -27,7 +29,7 @@ constexpr int kFewestRepeated = 20;
 
 struct PoseErrorModel::Sums {
   Matrix6d information = Matrix6d::Zero(), noise = Matrix6d::Zero();
-  double translation = 0, distance = 0;      // information, and its product with the distance
+  double translation = 0, distance = 0;        // information, and its product with the distance
   double square = 0, change2 = 0, common = 0;  // of residuals, of their changes, products of neighbours
   int residuals = 0, repeated = 0;
 };
@@ -53,8 +55,8 @@ PoseErrorModel::Pull& PoseErrorModel::pull_of(const Matcher& matcher, const Matc
   if (index < 0) {
     const LandmarkHandle landmark = matcher.landmark_of(match).handle;
     index = static_cast<std::int32_t>(pulls_.size());
-    pulls_.push_back({used_[landmark.index].landmark != landmark, Eigen::Matrix<double, 6, 2>::Zero(),
-                      Vector6d::Zero()});
+    pulls_.push_back(
+        {used_[landmark.index].landmark != landmark, Eigen::Matrix<double, 6, 2>::Zero(), Vector6d::Zero()});
   }
   return pulls_[static_cast<std::size_t>(index)];
 }
@@ -91,8 +93,7 @@ void PoseErrorModel::measure(const SE3& T_world_body, const Matcher& matcher,
   solve(sums);
 }
 
-void PoseErrorModel::compare_residuals(LandmarkHandle landmark, const Eigen::Vector2d& residual,
-                                       Sums* sums) {
+void PoseErrorModel::compare_residuals(LandmarkHandle landmark, const Eigen::Vector2d& residual, Sums* sums) {
   Used& used = used_[landmark.index];
   sums->square += residual.squaredNorm();
   ++sums->residuals;
@@ -112,14 +113,14 @@ void PoseErrorModel::learn_variances(const Sums& sums) {
   double own = 0.0, shared = 0.5 * sums.square / sums.residuals;
   if (sums.repeated >= kFewestRepeated) {
     own = 0.25 * sums.change2 / sums.repeated;
-    shared = std::max(0.5 * sums.common / sums.repeated, 0.0);
+    shared = 0.5 * sums.common / sums.repeated;
     frames_learned_ = std::min(frames_learned_ + 1, kLearning);
   } else if (frames_learned_ > 0) {
     return;
   }
   const double share = 1.0 / std::max(frames_learned_, 1);
   own_variance_ += share * (own - own_variance_);
-  shared_variance_ += share * (shared - shared_variance_);
+  shared_variance_ += share * (std::max(shared, kLeastVariance) - shared_variance_);
 }
 
 void PoseErrorModel::solve(const Sums& sums) {
@@ -136,9 +137,10 @@ void PoseErrorModel::solve(const Sums& sums) {
     const Matrix6d c = inverse * pull * inverse;
     return 0.5 * (c + c.transpose());
   };
-  errors_.noise = of_pose(kPatchesAsOne * (own_variance_ * sums.noise + shared_variance_ * patches) +
-                          kDepthsAsOne * shared_variance_ * depths);
-  errors_.exchanged = shared_variance_ * of_pose(kPatchesAsOne * new_patches + kExchangedDepthsAsOne * new_depths);
+  errors_.own = of_pose(kPatchesAsOne * own_variance_ * sums.noise);
+  errors_.noise = errors_.own + shared_variance_ * of_pose(kPatchesAsOne * patches + kDepthsAsOne * depths);
+  errors_.exchanged =
+      shared_variance_ * of_pose(kPatchesAsOne * new_patches + kExchangedDepthsAsOne * new_depths);
   errors_.holding_distance = sums.translation > 0.0 ? sums.distance / sums.translation : 0.0;
   errors_.known = errors_.noise.allFinite() && errors_.exchanged.allFinite() && sums.translation > 0.0;
 }

@@ -18,6 +18,8 @@ namespace farpoint::slam {
 struct PoseErrors {
   // Of the frame's measurements and of the landmarks that they are of.
   Matrix6d noise = Matrix6d::Zero();
+  // The part of it that the next frame does not share, but for the landmarks exchanged.
+  Matrix6d own = Matrix6d::Zero();
   // Between the landmarks that earlier frames have used and those that this frame is the first to use: what a
   // full exchange of the former by the latter adds to the error of the way.
   Matrix6d exchanged = Matrix6d::Zero();

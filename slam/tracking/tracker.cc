@@ -46,6 +46,7 @@ std::size_t Tracker::bytes() const {
 
 double Tracker::set_view(std::shared_ptr<const LocalView> view) {
   const double scale = matcher_.view() ? motion_.correct(*matcher_.view(), *view) : 1.0;
+  velocity_.change_unit(scale);
   matcher_.set_view(std::move(view));
   matcher_.mark_seen(last_seen_);
   return scale;
@@ -63,6 +64,7 @@ void Tracker::start(const SE3& T_world_body, std::int64_t utime) {
   matcher_.set_view(nullptr);
   counter_.clear();
   errors_.begin_map();
+  velocity_.clear();
 }
 
 TrackOutcome Tracker::track(const Frame& frame) {
@@ -125,10 +127,22 @@ TrackOutcome Tracker::relocalise(const Frame& frame) {
 }
 
 void Tracker::accept(const Frame& frame, const TrackOutcome& outcome) {
+  const Motion before = motion_.confirmed();
   motion_.accept(outcome.T_world_body, frame.utime);
   errors_.measure(outcome.T_world_body, matcher_, refiner_.measurements());
+  note_motion(before, frame, outcome.T_world_body);
   note_seen();
   confirmed_seen_.assign(last_seen_.begin(), last_seen_.end());
+}
+
+void Tracker::note_motion(const Motion& before, const Frame& frame, const SE3& T_world_body) {
+  // In a map of unknown unit half of the landmarks stand for those within ten metres.
+  constexpr double kMedianDepth_m = 10.0;
+  const LocalView& view = *matcher_.view();
+  const PoseErrors& errors = errors_.errors();
+  velocity_.advance(before.T_world_body.inverse() * T_world_body, seconds_between(before.utime, frame.utime),
+                    (errors.own + errors.exchanged).diagonal(),
+                    view.judgement.metric ? 1.0 : view.median_depth / kMedianDepth_m);
 }
 
 void Tracker::accept_on_trial(const Frame& frame, const TrackOutcome& outcome) {

@@ -21,6 +21,7 @@
 #include "slam/tracking/relocaliser.h"
 #include "slam/tracking/sighting_counter.h"
 #include "slam/tracking/track_outcome.h"
+#include "slam/tracking/velocity_filter.h"
 
 namespace farpoint::slam {
 
@@ -77,6 +78,8 @@ class Tracker {
   // Landmarks that the last accepted frame saw.
   void last_seen(std::vector<LandmarkHandle>* out) const { *out = last_seen_; }
 
+  // At the last accepted frame, filtered; for those outside. In map units.
+  [[nodiscard]] const VelocityFilter& velocity() const { return velocity_; }
   // Of the last accepted pose.
   [[nodiscard]] const PoseErrors& pose_errors() const { return errors_.errors(); }
 
@@ -95,6 +98,7 @@ class Tracker {
   TrackOutcome track_within(const Frame& frame, const PosePrior& prior, int attempts);
   bool coarse_pose(const Frame& frame, const PosePrior& prior, int attempts, SE3* T_world_body);
   [[nodiscard]] bool explains_matches(const PoseSolution& solution) const;
+  void note_motion(const Motion& before, const Frame& frame, const SE3& T_world_body);
   void note_seen();
 
   const TrackingConfig config_;
@@ -105,6 +109,7 @@ class Tracker {
   Relocaliser relocaliser_;
   SightingCounter counter_;
   PoseErrorModel errors_;
+  VelocityFilter velocity_;
   std::vector<LandmarkHandle> last_seen_;       // inliers of the last accepted frame
   std::vector<LandmarkHandle> confirmed_seen_;  // inliers of the last frame that was not on trial
 };

@@ -22,6 +22,10 @@ FrameOutput tracked() {
   r.velocity_body << 10, 0, 0, 0, 0, 0.5;
   r.quality = 90;
   r.covariance = slam::Matrix6d::Identity() * 1e-4;
+  r.velocity_covariance = slam::Matrix6d::Identity() * 0.04;
+  r.odometry.noise = slam::Matrix6d::Identity() * 0.01;
+  r.odometry.drift = slam::Matrix6d::Identity() * 0.03;
+  r.odometry.scale_sigma = 0.002;
   return make_frame_output(r, 0.0);
 }
 
@@ -40,6 +44,35 @@ TEST(EpochPredictor, BeforeTheFirstImageItSaysThatItIsStarting) {
   EXPECT_EQ(e.reason, ipc::Reason::kNoImageYet);
   EXPECT_TRUE(std::isnan(e.age_s));
   EXPECT_FALSE(e.pose_valid || e.velocity_valid || e.from_vision || e.predicted);
+}
+
+TEST(EpochPredictor, StandardDeviationsAreThoseOfNoiseAndDrift) {
+  const ipc::OdometryEpoch e = with(tracked()).at(kImage_us);
+  for (const double sigma : e.sigma_position_m) EXPECT_NEAR(sigma, 0.2, 1e-9);
+  EXPECT_NEAR(e.sigma_heading_rad, 0.2, 1e-9);
+  EXPECT_NEAR(e.sigma_roll_rad, 0.2, 1e-9);
+  for (const double sigma : e.sigma_velocity_m_s) EXPECT_NEAR(sigma, 0.2, 1e-9);
+  EXPECT_NEAR(e.sigma_yaw_rate_rad_s, 0.2, 1e-9);
+  EXPECT_EQ(e.scale_sigma, 0.002);
+}
+
+// Body axes turned by a quarter: what is uncertain ahead is uncertain in y.
+TEST(EpochPredictor, ThePositionsDeviationsAreAlongTheAxesOfOdom) {
+  FrameOutput frame = tracked();
+  frame.result.T_odom_body.q = slam::so3_exp({0, 0, 0.5 * 3.14159265358979});
+  frame.result.odometry.noise(0, 0) = 1.0;
+  frame.result.odometry.drift.setZero();
+  const ipc::OdometryEpoch e = with(frame).at(kImage_us);
+  EXPECT_NEAR(e.sigma_position_m[1], 1.0, 1e-6);
+  EXPECT_NEAR(e.sigma_position_m[0], 0.1, 1e-6);
+}
+
+TEST(EpochPredictor, WithoutAVelocityItSaysSo) {
+  FrameOutput frame = tracked();
+  frame.result.velocity_covariance = slam::unknown_covariance();
+  const ipc::OdometryEpoch e = with(frame).at(kImage_us);
+  EXPECT_TRUE(e.pose_valid);
+  EXPECT_FALSE(e.velocity_valid);
 }
 
 TEST(EpochPredictor, ThePoseIsThatOfTheMomentOfSendingAndTheAgeThatOfTheImage) {

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <vector>
+
 #include "daemon/system/side_functions.h"
 #include "ipc/channels.h"
 #include "ipc/reason.h"
@@ -57,6 +60,59 @@ TEST_F(FrameReporterTest, HandsEachFrameOnceToEverySinkAndThePublisher) {
   ASSERT_EQ(odometry.size(), 5U);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(odometry[static_cast<std::size_t>(i)].sequence, i);
   EXPECT_EQ(kept_.of<timing_t>(ipc::kTimingChannel).size(), 5U);
+}
+
+class AssumedScaleTest : public FrameReporterTest {
+ protected:
+  AssumedScaleTest() { config_.scale.assumed = 2.0; }
+  const FrameOutput& report_of(std::int32_t map, slam::State state) {
+    FramePackage p = package(++number_, 1.0, 1.0);
+    p.result.map_id = map;
+    p.result.state = state;
+    return reporter().report(&p, {});
+  }
+  FrameReporter& reporter() {
+    if (!with_scale_)
+      with_scale_.emplace(config_, FrameReporter::Names{}, std::vector<PoseSink*>{}, &publisher_, &maps_, 0,
+                          false);
+    return *with_scale_;
+  }
+
+ private:
+  int number_ = 0;
+  std::optional<FrameReporter> with_scale_;
+};
+
+TEST_F(AssumedScaleTest, HoldsUntilAMapHasAValidPoseAndThenForThatMapAlone) {
+  // A map that never came to a valid pose has no unit that anybody saw.
+  EXPECT_EQ(report_of(1, slam::State::kSettling).result.scale, slam::ScaleState::kAssumed);
+  EXPECT_FALSE(reporter().assumes_scale());
+  EXPECT_EQ(report_of(2, slam::State::kTracking).result.T_odom_body.t.x(), 2.0);
+  EXPECT_TRUE(reporter().assumes_scale());
+  const FrameOutput& next = report_of(3, slam::State::kTracking);
+  EXPECT_EQ(next.result.scale, slam::ScaleState::kUnknown);
+  EXPECT_EQ(next.result.T_odom_body.t.x(), 1.0);
+  EXPECT_EQ(report_of(2, slam::State::kTracking).result.scale, slam::ScaleState::kAssumed);
+}
+
+// What had drifted before is forgotten; the first pose keeps its noise.
+TEST_F(FrameReporterTest, AResetOfOdomBeginsItsDriftAnew) {
+  FramePackage p = package(0, 5.0, 5.0);
+  p.result.odometry.noise = slam::Matrix6d::Identity() * 0.01;
+  p.result.odometry.drift = slam::Matrix6d::Identity() * 100.0;
+  p.result.odometry.drift_of_second = slam::Matrix6d::Zero();
+  report(p);
+  reporter_.reset_odom();
+  EXPECT_TRUE(report(p).result.odometry.drift.isApprox(0.01 * slam::Matrix6d::Identity(), 1e-6));
+  p.result.odometry.drift += slam::Matrix6d::Identity();
+  const slam::Matrix6d grown = report(p).result.odometry.drift;
+  EXPECT_TRUE((grown - 0.01 * slam::Matrix6d::Identity())
+                  .isApprox(slam::carried(p.result.T_odom_body.inverse(), slam::Matrix6d::Identity()), 1e-6));
+  // A new map's drift begins by itself.
+  p.result.reset_counter += 1;
+  p.result.odometry.drift = slam::Matrix6d::Identity() * 0.02;
+  const slam::Matrix6d anew = report(p).result.odometry.drift;
+  EXPECT_TRUE(anew.isApprox(slam::carried(p.result.T_odom_body.inverse(), p.result.odometry.drift), 1e-9));
 }
 
 TEST_F(FrameReporterTest, TheStatusComesAtItsRateAndAtEachChangeOfState) {

@@ -23,6 +23,11 @@ slam::FrameResult tracked_result() {
   r.velocity_body << 10.0, 11.0, 12.0, 0.4, 0.5, 0.6;
   r.covariance = slam::Matrix6d::Identity() * 0.25;
   r.covariance(0, 5) = r.covariance(5, 0) = 0.01;
+  r.velocity_covariance = slam::Matrix6d::Identity() * 0.04;
+  r.odometry.noise = slam::Matrix6d::Identity() * 0.01;
+  r.odometry.drift = slam::Matrix6d::Identity() * 0.02;
+  r.odometry.drift_of_second = slam::Matrix6d::Identity() * 0.005;
+  r.odometry.scale_sigma = 0.1;
   r.quality = 80;
   r.reset_counter = 3;
   r.map_id = 2;
@@ -44,6 +49,47 @@ TEST(FrameOutput, AssumedScaleTurnsEveryLengthIntoMetres) {
   const slam::FrameResult raw = tracked_result();
   const Eigen::Vector3d p_odom(0.3, -0.2, 5.0);
   EXPECT_TRUE((f.result.map_from_odom * (2.0 * p_odom)).isApprox(2.0 * (raw.map_from_odom * p_odom), 1e-12));
+}
+
+TEST(FrameOutput, AssumedScaleTurnsTheLengthsOfTheOdometrysErrorsIntoMetres) {
+  const slam::FrameResult r = make_frame_output(tracked_result(), 2.0).result;
+  EXPECT_DOUBLE_EQ(r.odometry.noise(0, 0), 0.04);
+  EXPECT_DOUBLE_EQ(r.odometry.noise(4, 4), 0.01);
+  EXPECT_DOUBLE_EQ(r.odometry.drift(1, 1), 0.08);
+  EXPECT_DOUBLE_EQ(r.odometry.drift_of_second(1, 1), 0.02);
+  EXPECT_DOUBLE_EQ(r.velocity_covariance(2, 2), 0.16);
+  EXPECT_TRUE(std::isnan(r.odometry.scale_sigma));  // the key has none
+}
+
+// A camera 1.2 m ahead of the axle and half a metre beside it, in map units of 2 m. The vehicle turns on the
+// spot.
+TEST(FrameOutput, WithAnAssumedScaleThePoseIsTheBodysAndNotTheCameras) {
+  const Eigen::Vector3d lever_m(1.2, 0.5, 0.0);
+  const double turn = 0.7, rate = 0.3;
+  const Eigen::Quaterniond q = slam::so3_exp({0, 0, turn});
+  slam::FrameResult r = tracked_result();
+  r.T_odom_body = {q, (q * lever_m - lever_m) / 2.0};
+  r.T_map_body = r.T_odom_body;
+  r.map_from_odom = slam::Sim3{};
+  r.velocity_body << 0.5 * Eigen::Vector3d(0, 0, rate).cross(lever_m), 0, 0, rate;
+  const slam::FrameResult body = make_frame_output(r, 2.0, lever_m).result;
+  EXPECT_LT(body.T_odom_body.t.norm(), 1e-12);
+  EXPECT_LT(body.T_map_body.t.norm(), 1e-12);
+  EXPECT_LT(body.velocity_body.head<3>().norm(), 1e-12);
+  EXPECT_DOUBLE_EQ(body.velocity_body[5], rate);
+  EXPECT_LT(body.map_from_odom.t.norm(), 1e-12);
+  // The yaw's error moves the axle across, 1.2 m behind the camera.
+  EXPECT_NEAR(body.odometry.noise(1, 1), 4.0 * 0.01 + 1.2 * 1.2 * 0.01, 1e-12);
+  // Without a scale nobody can tell where the body is.
+  EXPECT_EQ(make_frame_output(r, 0.0, lever_m).result.T_odom_body.t, r.T_odom_body.t);
+}
+
+TEST(FrameOutput, TheLeverArmLeavesMapAndOdomTogether) {
+  const slam::FrameResult r = tracked_result();
+  const slam::FrameResult moved = make_frame_output(r, 2.0, {1.2, 0.5, -0.3}).result;
+  const slam::FrameResult still = make_frame_output(r, 2.0).result;
+  const Eigen::Vector3d lever(1.2, 0.5, -0.3), p(3.0, -4.0, 5.0);
+  EXPECT_TRUE((moved.map_from_odom * (p + lever)).isApprox(still.map_from_odom * p + lever, 1e-12));
 }
 
 TEST(FrameOutput, NoAssumedScaleChangesNothingAndAMeasuredOneWins) {
@@ -84,9 +130,15 @@ TEST(Messages, ValidFrame) {
   EXPECT_DOUBLE_EQ(o.orientation[3], f.result.T_odom_body.q.z());
   EXPECT_EQ(o.velocity[1], 11.0);
   EXPECT_EQ(o.angular_velocity[2], 0.6);
-  // Valid, and yet no uncertainty is claimed of odom.
-  for (const auto& row : o.pose_covariance)
-    for (const double number : row) EXPECT_TRUE(std::isnan(number));
+  EXPECT_EQ(o.noise_covariance[1][1], 0.01);
+  EXPECT_EQ(o.drift_covariance[5][5], 0.02);
+  EXPECT_EQ(o.twist_covariance[3][3], 0.04);
+  EXPECT_EQ(o.scale_sigma, 0.1);
+  const slam::Matrix6d marginal = f.result.odometry.since_reset(f.result.T_odom_body);
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column)
+      EXPECT_EQ(o.pose_covariance[row][column], marginal(row, column));
+  EXPECT_GT(o.pose_covariance[0][0] + o.pose_covariance[1][1] + o.pose_covariance[2][2], 0.1 * 0.1 * 77.0);
   EXPECT_EQ(o.boot_counter, 0);
   EXPECT_EQ(o.state, static_cast<int>(status_t::STATE_TRACKING));
   EXPECT_EQ(o.scale_state, static_cast<int>(status_t::SCALE_UNKNOWN));
@@ -125,6 +177,8 @@ TEST(Messages, LossLeavesNoNumberThatCouldBeTakenForAPose) {
   }
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(std::isnan(o.orientation[i]) && std::isnan(p.orientation[i]));
   EXPECT_TRUE(std::isnan(o.pose_covariance[3][3]) && std::isnan(p.covariance[0][0]));
+  EXPECT_TRUE(std::isnan(o.noise_covariance[0][0]) && std::isnan(o.drift_covariance[0][0]) &&
+              std::isnan(o.twist_covariance[0][0]) && std::isnan(o.scale_sigma));
 }
 
 TEST(Messages, StatesAndScalesHaveTheSameNumbersAsTheEstimators) {

@@ -31,6 +31,7 @@ slam::FrameResult result_at(std::int64_t utime, std::mt19937_64* random) {
   for (int i = 0; i < 6; ++i) r.velocity_body[i] = unit(*random);
   r.covariance.setIdentity();
   r.covariance *= 1e-4;
+  r.velocity_covariance = r.covariance;
   r.quality = 90;
   return r;
 }
