@@ -10,7 +10,7 @@ namespace {
 
 // Error that all alignments between the images of a pair have in common: of interpolation, and of the
 // calibration's field, which differs over the image. Level-0 pixels, 1 sigma.
-constexpr double kPairBias_px = 0.02;
+constexpr double kPairBias_px = 0.01;
 // Of the baseline as calibrated, relative: half a millimetre a metre.
 constexpr double kBaselineSigma = 0.0005;
 // The map's corrections swing to and fro: a part of each is drift, the rest takes an earlier one back.

@@ -20,6 +20,8 @@ constexpr double kPatchesAsOne = 4.0;
 constexpr double kDepthsAsOne = 1.0, kExchangedDepthsAsOne = 16.0;
 // No measurement is better than a tenth of its claimed sigma: what is left over of it is not seen.
 constexpr double kLeastVariance = 0.01;
+// Between two frames landmarks come in, and as many go.
+constexpr double kComeAndGo = 2.0;
 // Frames over which the variances are averaged.
 constexpr int kLearning = 20;
 // Fewest landmarks seen twice in a row that say something of the variances.
@@ -55,8 +57,10 @@ PoseErrorModel::Pull& PoseErrorModel::pull_of(const Matcher& matcher, const Matc
   if (index < 0) {
     const LandmarkHandle landmark = matcher.landmark_of(match).handle;
     index = static_cast<std::int32_t>(pulls_.size());
+    const Used& used = used_[landmark.index];
+    const bool is_new = used.landmark != landmark;
     pulls_.push_back(
-        {used_[landmark.index].landmark != landmark, Eigen::Matrix<double, 6, 2>::Zero(), Vector6d::Zero()});
+        {is_new, is_new || used.frame + 1 != frame_, Eigen::Matrix<double, 6, 2>::Zero(), Vector6d::Zero()});
   }
   return pulls_[static_cast<std::size_t>(index)];
 }
@@ -124,23 +128,23 @@ void PoseErrorModel::learn_variances(const Sums& sums) {
 }
 
 void PoseErrorModel::solve(const Sums& sums) {
-  Matrix6d patches = Matrix6d::Zero(), depths = Matrix6d::Zero();
-  Matrix6d new_patches = Matrix6d::Zero(), new_depths = Matrix6d::Zero();
+  Matrix6d all = Matrix6d::Zero(), exchanged = Matrix6d::Zero(), changed = Matrix6d::Zero();
   for (const Pull& pull : pulls_) {
-    (pull.is_new ? new_patches : patches).noalias() += pull.by_patch * pull.by_patch.transpose();
-    (pull.is_new ? new_depths : depths).noalias() += pull.by_depth * pull.by_depth.transpose();
+    const Matrix6d patch = kPatchesAsOne * pull.by_patch * pull.by_patch.transpose();
+    const Matrix6d depth = pull.by_depth * pull.by_depth.transpose();
+    all += patch + kDepthsAsOne * depth;
+    if (pull.is_new) exchanged += patch + kExchangedDepthsAsOne * depth;
+    if (pull.is_changed) changed += patch + kExchangedDepthsAsOne * depth;
   }
-  patches += new_patches;
-  depths += new_depths;
   const Matrix6d inverse = sums.information.ldlt().solve(Matrix6d::Identity());
-  const auto of_pose = [&](const Matrix6d& pull) -> Matrix6d {
-    const Matrix6d c = inverse * pull * inverse;
+  const auto of_pose = [&](double variance, const Matrix6d& pull) -> Matrix6d {
+    const Matrix6d c = variance * inverse * pull * inverse;
     return 0.5 * (c + c.transpose());
   };
-  errors_.own = of_pose(kPatchesAsOne * own_variance_ * sums.noise);
-  errors_.noise = errors_.own + shared_variance_ * of_pose(kPatchesAsOne * patches + kDepthsAsOne * depths);
-  errors_.exchanged =
-      shared_variance_ * of_pose(kPatchesAsOne * new_patches + kExchangedDepthsAsOne * new_depths);
+  errors_.own = of_pose(own_variance_, kPatchesAsOne * sums.noise);
+  errors_.noise = errors_.own + of_pose(shared_variance_, all);
+  errors_.step = errors_.own + kComeAndGo * of_pose(shared_variance_, changed);
+  errors_.exchanged = of_pose(shared_variance_, exchanged);
   errors_.holding_distance = sums.translation > 0.0 ? sums.distance / sums.translation : 0.0;
   errors_.known = errors_.noise.allFinite() && errors_.exchanged.allFinite() && sums.translation > 0.0;
 }

@@ -18,8 +18,10 @@ namespace farpoint::slam {
 struct PoseErrors {
   // Of the frame's measurements and of the landmarks that they are of.
   Matrix6d noise = Matrix6d::Zero();
-  // The part of it that the next frame does not share, but for the landmarks exchanged.
+  // The part of it that is the frame's own.
   Matrix6d own = Matrix6d::Zero();
+  // Against the frame before: its own part, and that of landmarks which only one of both used.
+  Matrix6d step = Matrix6d::Zero();
   // Between the landmarks that earlier frames have used and those that this frame is the first to use: what a
   // full exchange of the former by the latter adds to the error of the way.
   Matrix6d exchanged = Matrix6d::Zero();
@@ -54,7 +56,8 @@ class PoseErrorModel {
   // How the errors of a landmark pull the pose, before the solver's inverse: the place of its patch in two
   // directions, its depth; one claimed sigma each.
   struct Pull {
-    bool is_new = false;
+    bool is_new = false;      // no frame has used it
+    bool is_changed = false;  // the frame before has not
     Eigen::Matrix<double, 6, 2> by_patch;
     Vector6d by_depth;
   };

@@ -139,9 +139,8 @@ void Tracker::note_motion(const Motion& before, const Frame& frame, const SE3& T
   // In a map of unknown unit half of the landmarks stand for those within ten metres.
   constexpr double kMedianDepth_m = 10.0;
   const LocalView& view = *matcher_.view();
-  const PoseErrors& errors = errors_.errors();
   velocity_.advance(before.T_world_body.inverse() * T_world_body, seconds_between(before.utime, frame.utime),
-                    (errors.own + errors.exchanged).diagonal(),
+                    errors_.errors().step.diagonal(),
                     view.judgement.metric ? 1.0 : view.median_depth / kMedianDepth_m);
 }
 
