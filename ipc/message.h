@@ -55,7 +55,7 @@ inline constexpr std::string_view kLayout<map_from_odom_t> = "8 4 24 32 8 1 4";
 template <>
 inline constexpr std::string_view kLayout<map_t> = "8 4 1#[0:4][0:4][0:4][0:4][0:1][0:1]#[1:8][1:56]";
 template <>
-inline constexpr std::string_view kLayout<odometry_t> = "24 24 32 24 24 288 288 6 12";
+inline constexpr std::string_view kLayout<odometry_t> = "24 24 32 24 24 288 288 288 288 8 6 12";
 template <>
 inline constexpr std::string_view kLayout<pose_t> = "8 8 4 24 32 288 4 4 8 16 1";
 template <>

@@ -104,6 +104,7 @@ slam::FrameResult FrameReporter::since_odom_reset(const slam::FrameResult& resul
                                     ? drift_start_
                                     : slam::Matrix6d::Zero();
   r.odometry.drift = slam::carried(T_odom_start_.inverse(), result.odometry.drift - before);
+  r.odometry.drift_of_second = slam::carried(T_odom_start_.inverse(), result.odometry.drift_of_second);
   // What the map frame says stays as it is: map_from_odom takes up the difference.
   const slam::Sim3& S = result.map_from_odom;
   r.map_from_odom = {S.scale, (S.q * T_odom_start_.q).normalized(), S * T_odom_start_.t};

@@ -164,8 +164,7 @@ void MavlinkOutput::send_odometry(std::int64_t now_us) {
   const FrameOutput now = extrapolate(last_.frame, 1e-6 * static_cast<double>(age_us));
   const std::int64_t time_us = clock_.link_time_ns(now_us * kMicro_ns) / kMicro_ns;
   const slam::FrameResult& r = now.result;
-  // Autopilots take each pose as a measurement of its own. What drifts in a second stands for what they
-  // cannot be told.
+  // Autopilots take each pose as a measurement of its own, and their message has no field for drift.
   const MeasurementNoise noise{r.odometry.of_measurement(r.T_odom_body), r.velocity_covariance};
   send(mavlink_odometry(now, noise, static_cast<std::uint64_t>(std::max<std::int64_t>(time_us, 0))));
 }

@@ -45,7 +45,7 @@ TEST(VelocityFilter, IsThatOfTheNewestFrameWhileTheVehicleBrakesAndTurnsIn) {
   EXPECT_NEAR(filter.velocity()[5], kTurnIn * kNow_s, 0.005);
 }
 
-// Motion as the filter assumes it, measured with the noise that it is told.
+// Motion as the filter assumes it, measured with the noise that it is given.
 TEST(VelocityFilter, ItsCovarianceIsThatOfItsError) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;

@@ -80,7 +80,7 @@ TEST(FrameOutput, WithAnAssumedScaleThePoseIsTheBodysAndNotTheCameras) {
   EXPECT_LT(body.map_from_odom.t.norm(), 1e-12);
   // The yaw's error moves the axle across, 1.2 m behind the camera.
   EXPECT_NEAR(body.odometry.noise(1, 1), 4.0 * 0.01 + 1.2 * 1.2 * 0.01, 1e-12);
-  // Without a scale nobody can tell where the body is.
+  // A map of unknown unit has no place for the lever arm.
   EXPECT_EQ(make_frame_output(r, 0.0, lever_m).result.T_odom_body.t, r.T_odom_body.t);
 }
 
