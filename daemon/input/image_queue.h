@@ -30,8 +30,8 @@ struct CapturedImage {
 // image. Neither side waits.
 class ImageQueue {
  public:
-  // `capacity`: images that wait at most.
-  ImageQueue(std::size_t capacity, int width_px, int height_px);
+  // `capacity`: images that wait at most. `second_pixels`: of a second camera's images; 0: there is none.
+  ImageQueue(std::size_t capacity, int width_px, int height_px, std::size_t second_pixels = 0);
 
   // Capture: returns the image to fill, owned by the caller until push().
   [[nodiscard]] CapturedImage* begin_push();
