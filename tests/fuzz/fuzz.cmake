@@ -42,7 +42,7 @@ target_link_libraries(farpoint_fuzzed PUBLIC farpoint_fuzz_base farpoint_beside_
 target_link_libraries(farpoint_beside_fuzzed INTERFACE $<LINK_ONLY:farpoint_fuzzed>)
 
 add_custom_target(fuzz)
-foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps)
+foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps mavlink)
   add_executable(fuzz_${name} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/fuzz_main.cc)
   target_compile_definitions(fuzz_${name} PRIVATE FARPOINT_FUZZ_TARGET="${name}")
   target_link_libraries(fuzz_${name} PRIVATE farpoint_fuzzed)
