@@ -24,7 +24,7 @@ constexpr double kTurn_rad = 0.02;
 // A frame that comes a little early counts as in time.
 constexpr double kEarly_s = 0.001;
 
-// By the motion that most matches agree with. Without any such motion the shares would say nothing.
+// By the motion that most matches agree with; without any there is no share to name.
 Refusal poor_model(const TwoViewResult& motion) {
   const TwoViewOptions options;
   const auto agreeing = static_cast<double>(std::max(motion.inliers, motion.essential_inliers));

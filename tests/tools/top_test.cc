@@ -122,6 +122,25 @@ TEST(Top, FunctionsThatHaveNotBegunAreNamed) {
   EXPECT_TRUE(has(board.render(100.3, false), "missing   LCM, recording   12 attempts failed\n"));
 }
 
+TEST(Top, TheCameraIsNamedWithFormatRateAndExposure) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  board.take(s, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "camera    "));
+  s.camera = "usb:1-1";
+  s.camera_exposure_us = -1;
+  s.camera_gain = -1.0;
+  board.take(s, 100.2);
+  EXPECT_TRUE(has(board.render(100.3, false), "camera    usb:1-1   exposure unknown\n"));
+  s.camera_format = "YUYV";
+  s.camera_rate_hz = 30.0;
+  s.camera_exposure_us = 4500;
+  s.camera_gain = 12.0;
+  board.take(s, 100.4);
+  EXPECT_TRUE(
+      has(board.render(100.5, false), "camera    usb:1-1   YUYV at 30 Hz   exposure 4.5 ms   gain 12\n"));
+}
+
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {
   Board board;
   board.take(status_of(status_t::STATE_TRACKING), 100.0);
