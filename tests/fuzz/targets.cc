@@ -25,6 +25,7 @@ std::span<const Target> targets() {
       {"db3", run_db3, seeds_of_db3, 8192},
       {"stamps", run_stamps, seeds_of_stamps, 512},
       {"mavlink", run_mavlink, seeds_of_mavlink, 1024},
+      {"layout", run_layout, seeds_of_layout, 1024},
   };
   return all;
 }

@@ -52,6 +52,7 @@ void run_bag(ByteView input);
 void run_db3(ByteView input);
 void run_stamps(ByteView input);
 void run_mavlink(ByteView input);
+void run_layout(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_log();
 [[nodiscard]] std::vector<Bytes> seeds_of_message();
 [[nodiscard]] std::vector<Bytes> seeds_of_image();
@@ -66,5 +67,6 @@ void run_mavlink(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_db3();
 [[nodiscard]] std::vector<Bytes> seeds_of_stamps();
 [[nodiscard]] std::vector<Bytes> seeds_of_mavlink();
+[[nodiscard]] std::vector<Bytes> seeds_of_layout();
 
 }  // namespace farpoint::fuzz
