@@ -201,7 +201,8 @@ def check_recording(reader):
     expect("sensor_msgs/CompressedImage" in reader.said, "--list names no images")
     expect(f"drive.lcm: {PICTURES} images in 23.9 s (10 Hz)" in reader.said, "--check does not describe the log")
     expect("mask.png: " in reader.said and "% of the image" in reader.said, "--check does not describe the mask")
-    expect((where / "fault.tar.gz").stat().st_size > 1000, "no bugreport")
+    taken = subprocess.run(["tar", "-tzf", where / "fault.tar.gz"], capture_output=True, text=True, check=True).stdout
+    expect("hardware/processor.txt" in taken and "state/check.txt" in taken, "the bugreport lacks processor or check: " + taken)
 
 
 def expect_same_pictures(files, taken):

@@ -35,8 +35,9 @@ TEST_F(MappingTimesTest, AKeyframesTwoRepliesAreHandedOverTogether) {
   EXPECT_LT(taken().cpu_ms(timing_t::STAGE_MAPPING), 0.0);
   reply({Stage::kFusing, Stage::kLocalBa, Stage::kCulling});
   const StageClock clock = taken();
-  for (const int stage : {timing_t::STAGE_MAPPING, timing_t::STAGE_TRIANGULATION, timing_t::STAGE_FUSING,
-                          timing_t::STAGE_LOCAL_BA, timing_t::STAGE_CULLING}) {
+  for (const int stage : std::initializer_list<int>{timing_t::STAGE_MAPPING, timing_t::STAGE_TRIANGULATION,
+                                                    timing_t::STAGE_FUSING, timing_t::STAGE_LOCAL_BA,
+                                                    timing_t::STAGE_CULLING}) {
     EXPECT_GE(clock.cpu_ms(stage), 0.0) << stage;
     EXPECT_GE(clock.wall_ms(stage), 0.0) << stage;
   }
