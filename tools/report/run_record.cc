@@ -83,11 +83,13 @@ Trajectory of_fullest_map(const Trajectory& live) {
 }
 
 // The evaluation aligns the poses of all maps at once, as a receiver met them; a picture shows one map.
-slam::Sim3 alignment_of_live(const RunRecord& record, const RunMetrics& metrics, const Truth& truth) {
+slam::Sim3 alignment_of_live(const RunRecord& record, const Truth& truth) {
+  const RunMetrics& metrics = *record.metrics;
   if (!metrics.live_metrics || !metrics.live_metrics->absolute) return {};
   const slam::Sim3& of_all = metrics.live_metrics->absolute->map_to_world.S_world_map;
   if (record.live.poses.size() == record.run.log->live_trajectory.poses.size()) return of_all;
-  const auto found = align(pair_nearest(truth.body, record.live), metrics.alignment, metrics.planar);
+  const auto found =
+      align(pair_nearest(truth_for(record, truth), record.live), metrics.alignment, metrics.planar);
   return found ? found->S_world_map : of_all;
 }
 
@@ -132,8 +134,8 @@ RunRecord read_run_record(const std::filesystem::path& file, const Truth* truth)
   RunMetrics metrics = evaluate_run(record.run, truth != nullptr ? *truth : Truth{}, {});
   record.own = metrics.own;
   if (record.run.log) record.live = of_fullest_map(record.run.log->live_trajectory);
-  if (truth != nullptr) record.S_world_live = alignment_of_live(record, metrics, *truth);
   if (truth != nullptr) record.metrics = std::move(metrics);
+  if (truth != nullptr) record.S_world_live = alignment_of_live(record, *truth);
   read_messages(file, &record);
   if (!record.frames.empty()) record.start_s = record.frames.front().time_s;
   return record;
