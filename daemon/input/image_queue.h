@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "daemon/input/camera_note.h"
 #include "daemon/input/frame_source.h"
 #include "ipc/image_codec.h"
 
@@ -20,6 +21,7 @@ struct CapturedImage {
   bool has_second = false;
   drivers::CameraFrame meta;
   InputCounts in;                   // at the time of reading
+  CameraNote camera;                // live
   std::int64_t frames_dropped = 0;  // at the time of queueing
   double due_s = 0;                 // steady clock
   double decode_cpu_ms = -1.0, decode_wall_ms = -1.0;
