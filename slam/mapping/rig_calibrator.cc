@@ -17,6 +17,8 @@ constexpr int kRotation = 2;    // first of its three parameters
 constexpr int kDistortion = 3;  // in CalibrationDelta
 // Error of the rotation between the cameras in a good calibration: a tenth of a degree, 1 sigma.
 constexpr double kRotationSigma_rad = 0.002;
+// A pair shows its rotation in one keyframe; a second and third tell a turn from depth.
+constexpr std::ptrdiff_t kLeastKeyframes = 3;
 // As Calibrator.
 constexpr double kRemembered = 0.98;
 constexpr double kNoticeable_px = 0.05;
@@ -98,7 +100,7 @@ bool RigCalibrator::update(const BundleProblem& problem,
                            const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) {
   const auto free = std::count_if(problem.poses.begin(), problem.poses.end(),
                                   [](const BundleProblem::Pose& pose) { return !pose.fixed; });
-  if (free < config_.min_keyframes) return false;
+  if (free < kLeastKeyframes) return false;
   const RigModelOfWindow model(rig_);
   WindowEquations equations(problem, model);
   for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);

@@ -20,14 +20,14 @@ Soundness with_field(double field_px, double factor) {
 
 TEST(FurtherTrust, ASoundRigCountsInFull) {
   FurtherTrust trust;
-  for (int i = 1; i < 20; ++i) trust.note_adjustment(with_field(0.14, 1.0), i * 100'000);
+  for (int i = 1; i < 20; ++i) trust.note_adjustment(with_field(0.09, 1.0), i * 100'000);
   EXPECT_EQ(trust.sigma_factor(), 1.0);
 }
 
 // All measurements of a keyframe together then know the pose no better than the field is large.
 TEST(FurtherTrust, AFieldCountsAsOneMeasurementOfItsSize) {
   FurtherTrust trust;
-  constexpr double kField_px = 1.0, kOfSoundRigs_px = 0.15;
+  constexpr double kField_px = 1.0, kOfSoundRigs_px = 0.1;
   trust.note_adjustment(with_field(kField_px, 1.0), 100'000);
   const double together_px = trust.sigma_factor() * kSigma_px / std::sqrt(kMeasurements);
   EXPECT_NEAR(together_px, std::sqrt(kField_px * kField_px - kOfSoundRigs_px * kOfSoundRigs_px), 0.01);
