@@ -148,7 +148,8 @@ TEST(Soundness, MeanChiSquareHasTheWeightsOfTheAdjustment) {
   EXPECT_NEAR(soundness_of(p).mean_chi2, (10 * 0.5 + 0.1 * 100 * 2.0 + 20 * kLargestChi2) / 40.0, 1e-12);
 }
 
-// A second camera that swings on its mount: its own field says so, and the map is judged by the first camera.
+// A second camera that swings on its mount: its own field shows it, and the map is judged by the first
+// camera.
 TEST(Soundness, AFurtherCameraThatMovesIsToldApart) {
   SceneOptions options;
   options.cameras = 2;
