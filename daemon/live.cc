@@ -10,10 +10,9 @@
 #include <optional>
 
 #include "daemon/config/build_info.h"
-#include "daemon/config/camera_file.h"
-#include "daemon/config/rig.h"
 #include "daemon/input/camera_driver.h"
 #include "daemon/input/camera_source.h"
+#include "daemon/input/live_camera_options.h"
 #include "daemon/input/recorder.h"
 #include "daemon/input/wheel_source.h"
 #include "daemon/output/outputs.h"
@@ -43,47 +42,10 @@ bool is_run_time_key(const std::string& name) {
   return std::find(kRunTimeKeys.begin(), kRunTimeKeys.end(), name) != kRunTimeKeys.end();
 }
 
-drivers::ExposureOptions exposure_options(const ExposureConfig& c) {
-  drivers::ExposureOptions o;
-  o.mode = static_cast<drivers::ExposureMode>(c.mode);
-  o.manual_us = c.manual_us;
-  o.manual_gain = c.manual_gain;
-  o.short_us = c.short_us;
-  o.max_us = c.max_us;
-  o.max_gain_share = c.max_gain_share;
-  o.target_grey = c.target_grey;
-  return o;
-}
-
-const std::string& device_of(const CameraConfig& camera, int index) {
-  return index == 0 ? camera.device : camera.second_device;
-}
-
-calibration_t calibration_of_cameras(const CameraConfig& camera) {
-  if (camera.calibration == "log") {
-    if (camera.driver == CameraDriverChoice::kFile) return calibration_of_log(camera.device);
-    throw ConfigError(
-        "configuration: camera.calibration: log, expected a camera file, or camera.driver file");
-  }
-  std::vector<std::string> notices;
-  calibration_t calibration;
-  if (camera.has_second()) {
-    calibration = read_stereo_calibration(camera.calibration, camera.second_calibration, &notices);
-  } else {
-    const CameraFile file = read_camera_file(camera.calibration);
-    for (const std::string& notice : file.notices) notices.push_back(camera.calibration + ": " + notice);
-    calibration = calibration_of(file, "camera");
-  }
-  for (const std::string& notice : notices) spdlog::warn("{}", notice);
-  return calibration;
-}
-
 calibration_t read_calibration(const Config& config) {
-  if (config.camera.index != 0)
-    throw ConfigError("configuration: camera.index: " + std::to_string(config.camera.index) +
-                      ", expected 0 for a live camera");
-  calibration_t calibration = calibration_of_cameras(config.camera);
-  check_image_size(calibration, config);
+  std::vector<std::string> notices;
+  calibration_t calibration = read_live_calibration(config, &notices);
+  for (const std::string& notice : notices) spdlog::warn("{}", notice);
   return calibration;
 }
 
@@ -254,6 +216,8 @@ void LiveRun::open_wheels() {
 }
 
 std::unique_ptr<Session> LiveRun::open_session() {
+  // Images of a second camera are recorded; no queue carries them to tracking.
+  if (calibration_.cameras.size() > 1) config_.camera.use = CameraUse::kOne;
   const std::string second = config_.camera.has_second() ? " and " + config_.camera.second_device : "";
   spdlog::info("farpointd {}, configuration {:016x}, live from {} {}{}", build_text(), config_hash(config_),
                value_text(config_, "camera.driver"), config_.camera.device, second);
@@ -261,6 +225,7 @@ std::unique_ptr<Session> LiveRun::open_session() {
   config_.estimator.capacity.whole_trajectory = wants_results();
   std::unique_ptr<Session> session =
       make_session(config_, calibration_, &outputs_, !options_.output.empty(), wants_results());
+  session->reporter().set_camera(config_.camera.device);
   if (config_.realtime.deadline_ms == 0.0) session->reporter().set_deadline(1e3 / config_.camera.rate_hz);
   return session;
 }
@@ -436,25 +401,6 @@ int LiveRun::conclude() {
 }
 
 }  // namespace
-
-drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration, int index) {
-  const CameraConfig& c = config.camera;
-  const camera_calibration_t& camera = calibration.cameras.at(static_cast<std::size_t>(index));
-  drivers::CameraOptions o;
-  o.device = device_of(c, index);
-  o.index = index;
-  o.width_px = camera.width;
-  o.height_px = camera.height;
-  o.rate_hz = c.rate_hz;
-  o.format = static_cast<drivers::CameraFormat>(c.format);
-  o.buffers = c.buffers;
-  o.stamp_point = static_cast<drivers::StampPoint>(c.stamp);
-  o.readout_s = camera.row_time_s > 0.0 ? camera.row_time_s * camera.height : 0.0;
-  o.time_offset_us = c.time_offset_us;
-  o.stall_s = c.stall_s;
-  o.exposure = exposure_options(c.exposure);
-  return o;
-}
 
 std::string keys_that_need_a_restart(const Config& running, const Config& wanted) {
   std::string names;

@@ -26,10 +26,6 @@ struct LiveEnvironment {
 int live(const Options& options, const Config& config, const std::function<Config()>& reload,
          LiveEnvironment environment = {});
 
-// The driver's options of one camera: 0 the tracked one, 1 the second.
-[[nodiscard]] drivers::CameraOptions camera_options(const Config& config, const calibration_t& calibration,
-                                                    int index);
-
 // Names of the keys whose values differ and that do not take effect before a restart; empty: none.
 [[nodiscard]] std::string keys_that_need_a_restart(const Config& running, const Config& wanted);
 

@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -92,8 +93,13 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
       clock.new_frame();
       continue;
     }
-    const FrameOutput& output = session->process({frame.meta.utime, frame.meta.sequence, 0, frame.view()},
-                                                 source.counts(), outputs.counts(), recorded, &clock);
+    slam::FrameInput input{frame.meta.utime, frame.meta.sequence, 0, frame.view()};
+    slam::CameraImage second{1, {}};
+    if (frame.second != nullptr) {
+      second.image = SourceFrame::view_of(*frame.second);
+      input.others = std::span(&second, 1);
+    }
+    const FrameOutput& output = session->process(input, source.counts(), outputs.counts(), recorded, &clock);
     if (schedule != nullptr) schedule->check(output.result);
     cpu_ms.push_back(clock.cpu_ms(timing_t::STAGE_FRAME));
     show_progress(source.progress(), output.result, static_cast<std::int64_t>(cpu_ms.size()), &progress);
@@ -121,6 +127,7 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   PipelineOptions pipeline_options;
   pipeline_options.width_px = first.image->width_px;
   pipeline_options.height_px = first.image->height_px;
+  pipeline_options.second_pixels = source.second_pixels();
   const PipelineParts parts{&paced,   &session->estimator(), &session->reporter(),
                             &outputs, &session->tally(),     &realtime};
   Pipeline pipeline(config, pipeline_options, parts);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/check/check.h"
 #include "daemon/config/config.h"
 #include "daemon/config/options.h"
 #include "daemon/config/rig.h"
@@ -24,14 +25,19 @@ namespace {
 constexpr const char* kSystemConfig = "/etc/farpoint/farpoint.yaml";
 constexpr int kFailed = 1, kWrongUse = 2;
 
+// Path of the configuration; empty: built-in defaults.
+std::string configuration_file(const Options& options) {
+  std::error_code ignored;
+  if (options.config_path) return *options.config_path;
+  return std::filesystem::exists(kSystemConfig, ignored) ? kSystemConfig : "";
+}
+
 // *warnings: about a kept file.
 Config load_configuration(const Options& options, std::vector<std::string>* warnings) {
   Config config;
   ConfigOrigins origins;
-  std::error_code ignored;
-  if (options.config_path || std::filesystem::exists(kSystemConfig, ignored)) {
-    load_config_file(options.config_path.value_or(kSystemConfig), &config, &origins, warnings);
-  }
+  if (const std::string file = configuration_file(options); !file.empty())
+    load_config_file(file, &config, &origins, warnings);
   for (const std::string& setting : options.settings) apply_setting(setting, &config, &origins);
   check_relations(config, origins);
   return config;
@@ -62,12 +68,21 @@ int fail(const char* what, int status) {
   return status;
 }
 
+int check_only(const Options& options) {
+  const std::string file = configuration_file(options);
+  const std::string set = options.settings.empty() ? "" : ", with --set";
+  return check(
+      options, (file.empty() ? "built-in defaults" : file) + set,
+      [&options](std::vector<std::string>* warnings) { return load_configuration(options, warnings); });
+}
+
 int run_checked(int argc, const char* const* argv) {
   const CommandLine line = parse_command_line(argc, argv);
   if (!line.text_and_leave.empty()) {
     std::fputs(line.text_and_leave.c_str(), stdout);
     return 0;
   }
+  if (line.options.check) return check_only(line.options);
   std::vector<std::string> warnings;
   Config config = load_configuration(line.options, &warnings);
   load_solver(ceres_module_path(), &config.estimator.mapping);

@@ -10,25 +10,9 @@
 #include "ipc/can_frame.h"
 #include "ipc/can_layout.h"
 #include "ipc/e2e.h"
+#include "ipc/reason.h"
 
 namespace farpoint::ipc {
-
-// Raw values of signal Reason.
-enum class CanReason : std::uint8_t {
-  kNone = 0,
-  kNoImageYet = 1,
-  kNoCamera = 2,
-  kNoPoseInTime = 3,
-  kMapNotStarted = 4,
-  kMapSettling = 5,
-  kTrackingLost = 6,
-  kPlaceNotRecognised = 7,
-  kFewLandmarks = 8,
-  kCalibrationContradicted = 9,
-  kNumberOutOfRange = 10,
-  kStopped = 11,
-  kNotAvailable = 31,
-};
 
 // Raw value of signal State, beyond those of status_t.
 inline constexpr std::uint8_t kCanStateLost = 5, kCanStateStopped = 8;
@@ -50,7 +34,7 @@ struct OdometryEpoch {
   bool map_frame = false;           // the pose is of the map frame (may jump), else of odom (never jumps)
   std::uint32_t reset_counter = 0;  // sent modulo 256
   std::uint8_t boot_counter = 0;
-  CanReason reason = CanReason::kNone;
+  Reason reason = Reason::kNone;
   std::int32_t map_id = 0;  // sent modulo 256
   int quality = -1;         // 0..100, anything else: not available
   double age_s = 0;         // from mid-exposure to sending

@@ -114,8 +114,11 @@ constexpr std::array<CanSignalInfo, kCanSignals> kSignals{{
          "5 \"map settling\" 6 \"tracking lost\" 7 \"place not recognised yet\" 8 \"few landmarks\" "
          "9 \"calibration contradicted\" 10 \"number out of range\" 11 \"stopped\" 12 \"scale lost\" "
          "13 \"motion not observed\" 14 \"no inertial sensor\" 15 \"no wheel speeds\" 16 \"view blocked\" "
-         "31 \"not available\"",
-         "Why the state is not tracking. 12 to 16 are reserved for later versions; treat others as unknown.",
+         "17 \"too dark\" 18 \"few matches\" 19 \"standing\" 20 \"turning without moving\" "
+         "21 \"little parallax\" 22 \"ambiguous start\" 23 \"no common motion\" 24 \"residual field\" "
+         "25 \"moving scene\" 26 \"large residuals\" 27 \"unsound before\" 28 \"landmarks disagree\" "
+         "29 \"frozen image\" 31 \"not available\"",
+         "Why the state is not tracking. 12 to 15 are reserved for later versions; treat others as unknown.",
          31),
     number(M::kPositionXy, "PositionX", 16, 24, 0.01, 83886.07, "m", "Forward at the origin."),
     number(M::kPositionXy, "PositionY", 40, 24, 0.01, 83886.07, "m", "Left at the origin."),

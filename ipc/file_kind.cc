@@ -24,13 +24,12 @@ constexpr const char* kUnpack = "unpack it first";
 constexpr const char* kPictures = "'farpoint import images' takes a folder of them";
 constexpr const char* kVideo = "'farpoint import video' reads it";
 constexpr const char* kRosBag = "'farpoint import bag' reads it";
-constexpr const char* kDatabase = "'ros2 bag convert' writes it as MCAP for 'farpoint import bag'";
 constexpr const char* kNothing = "";
 
 constexpr std::array kMagics = {
     Magic{0, "#ROSBAG V"sv, {"a ROS 1 bag", kRosBag}},
     Magic{0, "\x89MCAP0\r\n"sv, {"an MCAP recording", kRosBag}},
-    Magic{0, "SQLite format 3\0"sv, {"an SQLite database (a ROS 2 bag has the name .db3)", kDatabase}},
+    Magic{0, "SQLite format 3\0"sv, {"an SQLite database (a ROS 2 bag has the name .db3)", kRosBag}},
     Magic{4, "ftyp"sv, {"an MP4 or MOV video", kVideo}},
     Magic{4, "moov"sv, {"a MOV video", kVideo}},
     Magic{0, "\x1a\x45\xdf\xa3"sv, {"a Matroska or WebM video", kVideo}},

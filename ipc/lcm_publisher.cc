@@ -10,9 +10,8 @@
 #include <string_view>
 
 namespace farpoint::ipc {
-namespace {
 
-// False where a UDP URL names a group without a route. LCM itself then writes a page to standard error.
+// LCM itself writes a page to standard error where there is no route.
 bool has_route(const std::string& url) {
   constexpr std::string_view kUdp = "udpm://", kDefaultGroup = "239.255.76.67";
   if (!url.starts_with(kUdp)) return true;
@@ -28,8 +27,6 @@ bool has_route(const std::string& url) {
   close(fd);
   return has;
 }
-
-}  // namespace
 
 LcmPublisher::LcmPublisher(const std::string& url, std::size_t buffer_bytes) : buffer_(buffer_bytes) {
   if (has_route(url)) lcm_ = lcm_create(url.c_str());

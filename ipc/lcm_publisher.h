@@ -21,6 +21,9 @@ struct LcmCounts {
   std::uint64_t too_large = 0;  // longer than the buffer; images and results of whole runs belong in logs
 };
 
+// False where a UDP URL names a group without a route; LcmPublisher cannot be made then. Sends nothing.
+[[nodiscard]] bool has_route(const std::string& url);
+
 class LcmPublisher {
  public:
   static constexpr std::size_t kDefaultBufferBytes = std::size_t{256} << 10;

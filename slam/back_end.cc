@@ -6,7 +6,10 @@
 namespace farpoint::slam {
 
 BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
-    : config_(config), rings_(*rings), mapper_(config, rig), poser_(config) {}
+    : config_(config),
+      rings_(*rings),
+      mapper_(config, rig),
+      poser_(config, static_cast<int>(rig.cameras.size())) {}
 
 void BackEnd::collect_recorded() {
   while (const RecordedFrame* frame = rings_.recorded.front()) {

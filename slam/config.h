@@ -29,7 +29,7 @@ struct CapacityConfig {
 struct InitialisationConfig {
   double min_parallax_rad = 0.0175;  // a quarter of the points must show it: one degree
   int min_landmarks = 80;            // good points two views must give
-  double max_frames = 60;            // age at which the reference frame is replaced
+  double max_age_s = 6.0;            // age at which the reference frame is replaced
 };
 
 struct TrackingConfig {
@@ -43,10 +43,10 @@ struct TrackingConfig {
 };
 
 struct KeyframeConfig {
-  double tracked_ratio = 0.85;   // of the reference keyframe's landmarks: fewer, new keyframe
-  int min_interval_frames = 2;   // between two keyframes: the local window must reach back far enough
-  int max_interval_frames = 10;  // with motion
-  double min_parallax_px = 15;   // median motion since the last keyframe that asks for a new one
+  double tracked_ratio = 0.85;      // of the reference keyframe's landmarks: fewer, new keyframe
+  double min_interval_s = 0.13;     // between two keyframes: the local window must reach back far enough
+  double max_interval_s = 1.0;      // with motion
+  double min_parallax_rad = 0.021;  // median motion since the last keyframe that asks for a new one
 };
 
 struct LandmarkConfig {
@@ -70,8 +70,8 @@ struct MappingConfig {
   int window_sightings = 24000;     // of these landmarks, most in one local BA
   int fixed_keyframes = 40;         // historical observers held fixed
   int iterations = 8;               // LM steps, never a time limit
-  int quick_view_delay_frames = 1;  // lockstep: from a keyframe to the view with its triangulation
-  int full_view_delay_frames = 2;   // lockstep: from a keyframe to the view after its local BA
+  double quick_view_delay_ms = 50;  // lockstep: from a keyframe to the view with its triangulation
+  double full_view_delay_ms = 100;  // lockstep: from a keyframe to the view after its local BA
   std::string solver = "schur";     // schur | ceres
   // Solves instead of the estimator's own solver. Required where `solver` is ceres.
   SolveBundle solve_instead = nullptr;
@@ -88,6 +88,12 @@ struct CalibrationConfig {
   int min_keyframes = 8;            // free poses a window must have
 };
 
+// How fast the frame `odom` follows the map's corrections.
+struct OdometryConfig {
+  double correction_share = 0.1;         // of the way driven
+  double correction_rad_per_s = 0.0175;  // turn, while the vehicle moves: one degree a second
+};
+
 struct EstimatorConfig {
   PyramidOptions pyramid;
   ExtractorOptions extractor;
@@ -98,6 +104,7 @@ struct EstimatorConfig {
   LandmarkConfig landmarks;
   MappingConfig mapping;
   CalibrationConfig calibration;
+  OdometryConfig odometry;
 };
 
 }  // namespace farpoint::slam

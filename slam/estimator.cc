@@ -18,12 +18,16 @@ void check_rig(const Rig& rig) {
   for (const RigCamera& c : rig.cameras)
     if (const std::string why = Camera::check(c.camera.parameters()); !why.empty())
       throw std::invalid_argument("camera '" + c.name + "': " + why);
+  for (const RigCamera& c : rig.cameras)
+    if (c.mask != nullptr &&
+        (c.mask->width_px() != c.camera.width_px() || c.mask->height_px() != c.camera.height_px()))
+      throw std::invalid_argument("camera '" + c.name + "': mask of another size than the camera's images");
 }
 
-// The map has no metric scale.
+// One camera's map has no metric scale; that of two has.
 Rig usable_rig(const Rig& rig) {
   check_rig(rig);
-  return with_body_at_camera(rig, 0);
+  return rig.cameras.size() > 1 ? rig : with_body_at_camera(rig, 0);
 }
 
 }  // namespace

@@ -32,21 +32,21 @@ FrameView full_view(const Camera& camera, std::size_t features) {
 std::shared_ptr<Frame> full_frame(const Rig& rig, int cameras, const EstimatorConfig& config) {
   auto frame = std::make_shared<Frame>();
   frame->views = PerCamera<FrameView>(cameras);
-  for (int c = 0; c < cameras; ++c)
-    frame->views[c] = full_view(rig.cameras[static_cast<std::size_t>(c)].camera,
-                                static_cast<std::size_t>(config.extractor.features));
+  frame->views[0] = full_view(rig.cameras[0].camera, static_cast<std::size_t>(config.extractor.features));
   return frame;
 }
 
 // Pyramids in use at once. Either a map is being built: its keyframes that keep theirs,
 // one more until the oldest is let go, two that began it. Or one is being looked for: the initialiser's
-// reference and every second one of half of its frames since. Besides the frame being tracked, the next
+// reference and candidates of the newer half of the time since. Besides the frame being tracked, the next
 // keyframe and the pair of a new map; and those of a map that was given up, until mapping has let them go.
 std::size_t pyramid_count(const EstimatorConfig& config) {
   constexpr std::size_t kInUse = 4, kOverlap = 4;
   const double history = static_cast<double>(Initialiser::kHistoryFrames);
   const auto looking =
-      static_cast<std::size_t>(std::min(0.25 * config.initialisation.max_frames, history)) + 4;
+      static_cast<std::size_t>(
+          std::min(0.5 * config.initialisation.max_age_s / Initialiser::kCandidateSpacing_s, history)) +
+      4;
   const std::size_t building = static_cast<std::size_t>(config.capacity.window_images) + 3;
   return std::max(looking, building) + kInUse + kOverlap;
 }
@@ -72,8 +72,10 @@ std::uint64_t pixel_hash(const ImageView& image) {
 
 // A pyramid behind the interface of a frame's image.
 struct FrameIntake::PyramidBuffer final : FrameImage {
-  PyramidBuffer(int width_px, int height_px, const PyramidOptions& options)
-      : pyramid(width_px, height_px, options), image(&pyramid) {}
+  PyramidBuffer(const RigCamera& of, const PyramidOptions& options)
+      : mask(of.mask),
+        pyramid(of.camera.width_px(), of.camera.height_px(), options),
+        image(&pyramid, mask.get()) {}
   [[nodiscard]] bool extract_patch(const FeatureSet& set, std::size_t index, Patch* patch) const override {
     return image.extract_patch(set, index, patch);
   }
@@ -81,29 +83,36 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
                                 const Eigen::Vector2f& predicted_px, float max_shift_px) const override {
     return image.align(host, A, predicted_px, max_shift_px);
   }
+  std::shared_ptr<const ImageMask> mask;
+
+  [[nodiscard]] bool correlate(const Patch& host, const Eigen::Matrix2f& A,
+                               std::span<const Eigen::Vector2f> pixels,
+                               std::span<float> zncc) const override {
+    return image.correlate(host, A, pixels, zncc);
+  }
   Pyramid pyramid;
   PyramidImage image;
 };
 
 struct FrameIntake::CameraIntake {
-  CameraIntake(const Camera& model, const EstimatorConfig& config)
-      : camera(model),
-        extractor(model.width_px(), model.height_px(), config.pyramid, config.extractor),
-        pyramids(pyramid_count(config), [&model, &config] {
-          return std::make_shared<PyramidBuffer>(model.width_px(), model.height_px(), config.pyramid);
+  CameraIntake(const RigCamera& of, const EstimatorConfig& config)
+      : camera(of.camera), mask(of.mask), pyramids(pyramid_count(config), [&of, &config] {
+          return std::make_shared<PyramidBuffer>(of, config.pyramid);
         }) {}
 
   Camera camera;
-  Extractor extractor;
+  std::shared_ptr<const ImageMask> mask;  // null: none
   SharedPool<PyramidBuffer> pyramids;
   std::uint64_t image_hash = 0;  // of the last image
 };
 
-FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras) : config_(config) {
+FrameIntake::FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras)
+    : config_(config),
+      extractor_(rig.cameras[0].camera.width_px(), rig.cameras[0].camera.height_px(), config.pyramid,
+                 config.extractor) {
   cameras_.reserve(static_cast<std::size_t>(cameras));
   for (int c = 0; c < cameras; ++c)
-    cameras_.push_back(
-        std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)].camera, config_));
+    cameras_.push_back(std::make_unique<CameraIntake>(rig.cameras[static_cast<std::size_t>(c)], config_));
   frames_ = SharedPool<Frame>(kFrames, [&] { return full_frame(rig, cameras, config_); });
 }
 
@@ -131,24 +140,23 @@ std::shared_ptr<Frame> FrameIntake::take_frame(const Input& input) {
   frame->number = next_number_++;
   frame->utime = input.utime;
   frame->sequence = input.sequence;
-  for (int c = 0; c < frame->views.size(); ++c) {
-    FrameView& view = frame->views[c];
-    view.set.features.clear();
-    view.set.descriptors.clear();
-    view.grid.build(view.set.features);
-  }
+  frame->repeats = false;
+  FrameView& view = frame->views[0];
+  view.set.features.clear();
+  view.set.descriptors.clear();
+  view.grid.build(view.set.features);
   return frame;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(const FrameInput& input) {
   const CameraImage first{input.camera, input.image};
-  const bool takes_others = std::all_of(input.others.begin(), input.others.end(),
-                                        [this](const CameraImage& image) { return takes(image); });
-  if (!takes(first) || !takes_others || !advance(input.utime)) return {};
+  if (input.camera != 0 || !takes(first) || !advance(input.utime)) return {};
   std::shared_ptr<Frame> frame = take_frame(input);
-  if (!frame || !fill_view(first, input.most_features, frame.get())) return {};
+  if (!frame) return {};
+  frame->repeats = true;
+  if (!fill_view(first, input.most_features, frame.get())) return {};
   for (const CameraImage& other : input.others)
-    if (!fill_view(other, input.most_features, frame.get())) return {};
+    if (other.camera > 0 && takes(other)) fill_pixels(other, frame.get());
   return frame;
 }
 
@@ -159,16 +167,28 @@ bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* 
   if (!pixels) return false;
   const std::uint64_t hash = pixel_hash(input.image);
   if (std::exchange(camera.image_hash, hash) == hash) return true;
+  frame->repeats = false;
   FrameView& view = frame->views[input.camera];
   {
     const StageSpan span(listener_, Stage::kPyramid);
     pixels->pyramid.build(input.image);
   }
   const StageSpan span(listener_, Stage::kExtraction);
-  camera.extractor.extract(pixels->pyramid, {}, &view.set, most_features);
+  extractor_.extract(pixels->pyramid, camera.mask.get(), &view.set, most_features);
   view.image = pixels;
   view.grid.build(view.set.features);
   return true;
+}
+
+void FrameIntake::fill_pixels(const CameraImage& input, Frame* frame) {
+  CameraIntake& camera = *cameras_[static_cast<std::size_t>(input.camera)];
+  const std::uint64_t hash = pixel_hash(input.image);
+  if (std::exchange(camera.image_hash, hash) == hash) return;  // of the past
+  const std::shared_ptr<PyramidBuffer> pixels = camera.pyramids.take();
+  if (!pixels) return;
+  const StageSpan span(listener_, Stage::kPyramid);
+  pixels->pyramid.build(input.image);
+  frame->views[input.camera].image = pixels;
 }
 
 std::shared_ptr<Frame> FrameIntake::take(FeatureInput&& input) {
@@ -195,9 +215,15 @@ std::vector<std::pair<std::string, std::size_t>> FrameIntake::memory_table() con
     frame_bytes += view.set.features.capacity() * sizeof(Feature) +
                    view.set.descriptors.capacity() * sizeof(Descriptor) + view.grid.bytes();
   }
-  for (const auto& camera : cameras_)
+  std::size_t mask_bytes = 0;
+  for (const auto& camera : cameras_) {
     pyramid_bytes += camera->pyramids.capacity() * camera->pyramids.sample().pyramid.bytes();
-  return {{"pyramids", pyramid_bytes}, {"frames", frames_.capacity() * frame_bytes}};
+    if (camera->mask) mask_bytes += camera->mask->bytes();
+  }
+  std::vector<std::pair<std::string, std::size_t>> table{{"pyramids", pyramid_bytes},
+                                                         {"frames", frames_.capacity() * frame_bytes}};
+  if (mask_bytes > 0) table.emplace_back("masks", mask_bytes);
+  return table;
 }
 
 }  // namespace farpoint::slam

@@ -21,16 +21,18 @@ namespace farpoint::slam {
 
 class FrameIntake {
  public:
-  // Takes images of the first `cameras` cameras of the rig.
+  // Takes images of the first `cameras` cameras of the rig. Camera 0 gives features and pixels; further ones
+  // give pixels, in which the features of camera 0 are measured.
   FrameIntake(const EstimatorConfig& config, const Rig& rig, int cameras = 1);
   ~FrameIntake();
   FrameIntake(const FrameIntake&) = delete;
   FrameIntake& operator=(const FrameIntake&) = delete;
   void listen(StageListener* listener) { listener_ = listener; }
 
-  // Null where the frame cannot be used: wrong size, a camera whose images are not taken, a time not after
-  // the last frame's, or no room. An image with the pixels of the one before gives a view without features: a
-  // camera that hangs shows nothing of the present.
+  // Null where the frame cannot be used: a wrong size of the first image, a camera whose images are not
+  // taken, a time not after the last frame's, or no room. A further camera's image of a wrong size, or
+  // without room, is left out: the frame is one of fewer cameras. An image with the pixels of the one before
+  // gives a view without features: a camera that hangs shows nothing of the present.
   [[nodiscard]] std::shared_ptr<Frame> take(const FrameInput& input);
   [[nodiscard]] std::shared_ptr<Frame> take(FeatureInput&& input);
 
@@ -45,7 +47,7 @@ class FrameIntake {
  private:
   struct PyramidBuffer;
 
-  // One camera's extractor and pixels.
+  // One camera's pixels.
   struct CameraIntake;
 
   [[nodiscard]] bool takes(int camera) const {
@@ -55,10 +57,12 @@ class FrameIntake {
   // Notes the time of a frame. False where it is not after the last frame's.
   [[nodiscard]] bool advance(std::int64_t utime);
   [[nodiscard]] bool fill_view(const CameraImage& input, int most_features, Frame* frame);
+  void fill_pixels(const CameraImage& input, Frame* frame);
   template <typename Input>
   [[nodiscard]] std::shared_ptr<Frame> take_frame(const Input& input);
 
   const EstimatorConfig config_;
+  Extractor extractor_;                                 // of camera 0
   std::vector<std::unique_ptr<CameraIntake>> cameras_;  // by camera
   SharedPool<Frame> frames_;
   StageListener* listener_ = nullptr;

@@ -8,6 +8,7 @@
 
 #include "slam/geometry/se3.h"
 #include "slam/image/extractor.h"
+#include "slam/map/refusal.h"
 #include "slam/mapping/counts.h"
 
 namespace farpoint::slam {
@@ -76,6 +77,7 @@ struct FrameResult {
   Sim3 map_from_odom;
   Vector6d velocity_body = Vector6d::Zero();  // m/s (odom units/s), rad/s in body axes
   Matrix6d covariance = Matrix6d::Zero();     // of T_map_body, order (translation, rotation), body axes
+  Refusal refusal;                            // why the pose is not valid
   int quality = -1;                           // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;
   ScaleState scale = ScaleState::kUnknown;

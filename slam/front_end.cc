@@ -14,14 +14,32 @@ namespace {
 constexpr std::size_t kImuWaiting = 2048, kImuKept = 4096;
 constexpr std::size_t kWheelsWaiting = 256, kWheelsKept = 512;
 
+std::int64_t seconds_to_us(double s) {
+  return static_cast<std::int64_t>(std::llround(1e6 * s));
+}
+
+// More than one camera gave pixels: the frame has depth of its own.
+bool shows_pair(const Frame& frame) {
+  for (int c = 1; c < frame.views.size(); ++c)
+    if (frame.views[c].image) return frame.views[0].image != nullptr;
+  return false;
+}
+
+int quality_of(const TrackOutcome& outcome) {
+  const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
+  return static_cast<int>(std::lround(100.0 * share));
+}
+
 }  // namespace
 
 FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
     : config_(config),
-      intake_(config, rig),
+      intake_(config, rig, static_cast<int>(rig.cameras.size())),
       initialiser_(config, rig),
-      tracker_(config),
+      tracker_(config, static_cast<int>(rig.cameras.size())),
       port_(config.mapping, rings),
+      odometry_(config.odometry),
+      repeated_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept) {
   waiting_.reserve(2 * Initialiser::kHistoryFrames);
@@ -62,18 +80,25 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   result_.sequence = frame->sequence;
   result_.features = static_cast<int>(frame->feature_count());
   take_samples(*frame, limit.up_to);
-  take_replies(frame->number, {limit.replies_by_delay, limit.up_to.replies});
+  take_replies(frame->utime, {limit.replies_by_delay, limit.up_to.replies});
+  repeated_share_ = repeated_.add(frame->views[0].set);
   const bool blind = result_.features < config_.tracking.min_inliers;
-  if (state_ == State::kInitialising) {
+  const bool held = frame->repeats && is_valid(state_) && standstill_.explains_repeat(frame->utime);
+  if (!blind && replaces_map(*frame)) {
+    give_up_map(recovery_.ever_settled() ? MappingJobKind::kRetireMap : MappingJobKind::kDiscardMap, frame);
+  } else if (state_ == State::kInitialising) {
     if (!blind) initialise(frame);
+  } else if (held) {
+    hold_pose(*frame);
   } else if (blind) {
     skip_blind_frame();
   } else {
     follow(frame);
   }
-  if (!blind) recovery_.note_seen(frame->utime);
+  if (!blind || held) recovery_.note_seen(frame->utime);
   fill_map_state();
-  if (blind && state_ != State::kInitialising) result_.state = State::kLost;
+  if (blind && !held && state_ != State::kInitialising) result_.state = State::kLost;
+  result_.refusal = refusal_of(*frame, blind && !held);
   result_.jobs_under_way = static_cast<int>(port_.jobs_under_way());
   return result_;
 }
@@ -87,10 +112,30 @@ void FrontEnd::take_samples(const Frame& frame, const FrameTaken& up_to) {
   result_.taken.wheels = counts_.wheels.taken();
 }
 
+Refusal FrontEnd::refusal_of(const Frame& frame, bool blind) const {
+  if (blind && frame.repeats) return {.reason = Reason::kFrozenImage};
+  if (blind)
+    return {Reason::kTooDark, static_cast<double>(result_.features),
+            static_cast<double>(config_.tracking.min_inliers)};
+  switch (state_) {
+    case State::kInitialising:
+      return initialiser_.refusal();
+    case State::kSettling:
+      return validity_.refusal();
+    case State::kLost:
+      return {Reason::kLost, static_cast<double>(result_.inliers),
+              static_cast<double>(config_.tracking.min_inliers)};
+    case State::kRelocalising:
+      return {.reason = Reason::kPlaceNotRecognised};
+    default:
+      return {};
+  }
+}
+
 // --- mapping's replies
 
-void FrontEnd::take_replies(std::uint64_t frame_number, const ReplyLimit& limit) {
-  while (const MappingReply* reply = port_.take_reply(frame_number, limit)) {
+void FrontEnd::take_replies(std::int64_t utime, const ReplyLimit& limit) {
+  while (const MappingReply* reply = port_.take_reply(utime, limit)) {
     take_reply(*reply);
     port_.release_reply();
   }
@@ -116,32 +161,47 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
-  settled_ = tracker_.view()->settled;
+  note_whether_settled();
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
+}
+
+void FrontEnd::note_whether_settled() {
+  if (!tracker_.view()->judgement.steady) return;
+  odometry_.follow_map();
+  recovery_.note_settled();
 }
 
 // Lockstep: within the frame that found the pair. Threads: before the first frame after mapping is done.
 void FrontEnd::start_map(const MappingReply& reply) {
   const auto pair = std::exchange(start_pair_, {});
-  if (!reply.view) return;
-  const Frame &first = *pair.first, &second = *pair.second;
+  if (!reply.view) {
+    if (pair.first && !pair.second) {
+      // The frame stays to be posed; its pixels are wanted no longer.
+      pair.first->drop_pixels();
+      no_depth_utime_ = pair.first->utime;
+    }
+    return;
+  }
+  const bool one_frame = pair.second == nullptr;
+  const Frame &first = *pair.first, &second = one_frame ? first : *pair.second;
   const LocalView& view = *reply.view;
   ++map_id_;
   ++counts_.maps;
   odometry_.begin_map();
   recovery_.begin_map();
-  settled_ = false;
+  validity_.begin_map();
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
-  frames_since_keyframe_ = config_.keyframes.min_interval_frames - 1;
+  keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
   tracker_.set_view(reply.view);
-  port_.begin_map(second.number);
+  note_whether_settled();
+  if (view.judgement.metric) no_depth_utime_.reset();
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
   std::erase_if(waiting_, [&](const auto& f) { return f == pair.first || f == pair.second; });
   for (const auto& f : waiting_) f->drop_pixels();
-  record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
+  if (!one_frame) record({first.utime, map_id_, view.keyframes.front().id, SE3{}});
   record({second.utime, map_id_, view.reference_id,
           view.S_world_reference().inverse() * view.T_world_reference});
   initialiser_.clear();
@@ -151,7 +211,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
 
 const FrameResult& FrontEnd::take_replies_at_once() {
   const bool had_map = state_ != State::kInitialising;
-  take_replies(intake_.number(), ReplyLimit{});
+  take_replies(intake_.utime(), ReplyLimit{});
   if (!had_map && state_ != State::kInitialising) fill_map_state();
   return result_;
 }
@@ -163,27 +223,62 @@ MappingJob* FrontEnd::begin_job(MappingJobKind kind) {
 // --- before the map
 
 void FrontEnd::initialise(const std::shared_ptr<Frame>& frame) {
-  if (start_pair_.second) {
+  if (start_pair_.first) {
     initialiser_.remember(frame);
+    return;
+  }
+  if (may_start_metric(*frame)) {
+    initialiser_.remember(frame);
+    InitialPair pair;
+    pair.first = frame;
+    start_from(pair);
     return;
   }
   const InitialPair* pair = initialiser_.add(frame);
   result_.matches = initialiser_.last_matches();
-  if (pair == nullptr) return;
+  if (pair != nullptr) start_from(*pair);
+}
+
+// Where all is too far for the rig's baseline, motion makes a map; the rig is asked again now and then.
+bool FrontEnd::may_start_metric(const Frame& frame) const {
+  constexpr double kRetry_s = 1.0;
+  return shows_pair(frame) &&
+         (!no_depth_utime_ || seconds_between(*no_depth_utime_, frame.utime) >= kRetry_s);
+}
+
+// The map was made before the further camera came: its unit is unknown, the new one's will be the metre.
+bool FrontEnd::replaces_map(const Frame& frame) const {
+  const LocalView* view = tracker_.view();
+  return state_ != State::kInitialising && view != nullptr && !view->judgement.metric && !no_depth_utime_ &&
+         shows_pair(frame);
+}
+
+void FrontEnd::start_from(const InitialPair& pair) {
   MappingJob* job = begin_job(MappingJobKind::kStartMap);
   if (job == nullptr) return;
   job->map_id = map_id_ + 1;
-  job->pair = *pair;
+  job->pair = pair;
   send_job();
-  start_pair_ = {pair->first, pair->second};
+  start_pair_ = {pair.first, pair.second};
 }
 
 // --- against the map
 
 // A frame that shows nothing counts as a missing one.
 void FrontEnd::skip_blind_frame() {
+  standstill_.note_loss();
   result_.has_pose = false;
   result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
+}
+
+// The image is the one before, and the vehicle stands: so is its pose.
+void FrontEnd::hold_pose(const Frame& frame) {
+  last_outcome_.T_world_body = tracker_.T_world_body();  // a newer view may have moved it
+  record(relative_to_reference(frame, last_outcome_));
+  fill_pose(last_outcome_.T_world_body, last_outcome_.covariance);
+  result_.velocity_body.setZero();
+  result_.quality = quality_of(last_outcome_);
+  result_.view_sequence = tracker_.view()->sequence;
 }
 
 void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
@@ -231,22 +326,26 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
   recovery_.note_tracked();
   tracker_.accept(*frame, outcome);
   record(relative_to_reference(*frame, outcome));
-  ++frames_since_keyframe_;
   maybe_keyframe(frame, outcome);
-  if (settled_ && !waiting_.empty()) pose_waiting_frames();
-  if (!settled_ || !outcome.agreed())
+  const MapJudgement& judgement = tracker_.view()->judgement;
+  if (judgement.settled(frame->utime) && !waiting_.empty()) pose_waiting_frames();
+  const double repeated_share = standstill_.stands() ? 0.0 : repeated_share_;
+  if (!validity_.note_tracked(frame->utime, judgement, outcome, repeated_share))
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
   fill_pose(outcome.T_world_body, outcome.covariance);
-  const double share = static_cast<double>(outcome.inliers) / std::max(1, outcome.matches);
-  result_.quality = is_valid(state_) ? static_cast<int>(std::lround(100.0 * share)) : -1;
+  result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
+  last_outcome_ = outcome;
+  standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime,
+                          repeated_share_ > Validity::kFrozenShare);
 }
 
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {
+  standstill_.note_loss();
+  validity_.note_lost();
   if (!is_lost(state_)) ++counts_.lost;
-  const int keyframes = tracker_.view() != nullptr ? tracker_.view()->map_keyframes : 0;
-  const Recovery::Verdict verdict = recovery_.note_lost(frame->utime, settled_, keyframes);
+  const Recovery::Verdict verdict = recovery_.note_lost(frame->utime);
   state_ = recovery_.state();
   if (verdict == Recovery::Verdict::kDiscardMap) give_up_map(MappingJobKind::kDiscardMap, frame);
   if (verdict == Recovery::Verdict::kRetireMap) give_up_map(MappingJobKind::kRetireMap, frame);
@@ -260,15 +359,20 @@ void FrontEnd::give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& fr
   waiting_.clear();
   initialiser_.clear();
   state_ = State::kInitialising;
-  (void)initialiser_.add(frame);
+  if (may_start_metric(*frame))
+    initialise(frame);
+  else
+    (void)initialiser_.add(frame);
 }
 
 // --- hand-over to mapping
 
 void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
   const StageSpan span(listener_, Stage::kKeyframe);
-  if (!wants_keyframe(config_, *tracker_.view(), outcome, {frames_since_keyframe_, true})) return;
-  if (!port_.is_free(frame->number)) {
+  if (!wants_keyframe(config_, *tracker_.view(), outcome,
+                      {seconds_between(keyframe_utime_, frame->utime), true}))
+    return;
+  if (!port_.is_free()) {
     ++counts_.keyframes_dropped;
     return;
   }
@@ -282,7 +386,7 @@ void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOu
   tracker_.sightings(&request.sightings);
   tracker_.take_counts(&request.counts);
   send_job();
-  frames_since_keyframe_ = 0;
+  keyframe_utime_ = frame->utime;
   result_.keyframe = true;
 }
 
@@ -303,7 +407,7 @@ void FrontEnd::finish() {
 }
 
 void FrontEnd::take_counts() {
-  while (const MappingReply* reply = port_.take_reply(intake_.number(), {.by_delay = false})) {
+  while (const MappingReply* reply = port_.take_reply(intake_.utime(), {.by_delay = false})) {
     note_counts(*reply);
     port_.release_reply();
   }
@@ -331,9 +435,10 @@ void FrontEnd::fill_map_state() {
 }
 
 void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
-  odometry_.advance(T_map_body);
+  odometry_.advance(T_map_body, result_.utime, std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
   result_.has_pose = true;
   result_.T_map_body = T_map_body;
+  if (tracker_.view() != nullptr && tracker_.view()->judgement.metric) result_.scale = ScaleState::kMetric;
   result_.T_odom_body = odometry_.T_odom_body();
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
   result_.velocity_body = tracker_.velocity_body();
@@ -345,6 +450,7 @@ std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const 
   auto table = intake_.memory_table();
   table.emplace_back("tracker", tracker_.bytes());
   table.emplace_back("initialiser", initialiser_.bytes());
+  table.emplace_back("repeated features", repeated_.bytes());
   table.emplace_back("sensor samples", imu_.bytes() + wheels_.bytes());
   return table;
 }

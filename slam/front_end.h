@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,9 +20,12 @@
 #include "slam/odometry.h"
 #include "slam/recovery.h"
 #include "slam/sample_queue.h"
+#include "slam/standstill.h"
 #include "slam/tracking/initialiser.h"
 #include "slam/tracking/keyframe_policy.h"
+#include "slam/tracking/repeated_features.h"
 #include "slam/tracking/tracker.h"
+#include "slam/validity.h"
 
 namespace farpoint::slam {
 
@@ -63,19 +67,26 @@ class FrontEnd {
 
  private:
   const FrameResult& reject(std::int64_t utime);
+  // Why the present frame has no valid pose.
+  [[nodiscard]] Refusal refusal_of(const Frame& frame, bool blind) const;
   const FrameResult& step(const std::shared_ptr<Frame>& frame, const TakeLimit& limit);
 
   void take_samples(const Frame& frame, const FrameTaken& up_to);
-  void take_replies(std::uint64_t frame_number, const ReplyLimit& limit);
+  void take_replies(std::int64_t utime, const ReplyLimit& limit);
   void take_reply(const MappingReply& reply);
   void note_counts(const MappingReply& reply);
   void take_view(std::shared_ptr<const LocalView> view);
+  void note_whether_settled();
   void start_map(const MappingReply& reply);
   [[nodiscard]] MappingJob* begin_job(MappingJobKind kind);
   void send_job() { result_.job = port_.send_job(); }
 
   void initialise(const std::shared_ptr<Frame>& frame);
+  void start_from(const InitialPair& pair);
+  [[nodiscard]] bool may_start_metric(const Frame& frame) const;
+  [[nodiscard]] bool replaces_map(const Frame& frame) const;
   void skip_blind_frame();
+  void hold_pose(const Frame& frame);
   void follow(const std::shared_ptr<Frame>& frame);
   TrackOutcome search_for(const Frame& frame, Recovery::Search search);
   void note_relocalised(const Frame& frame, const TrackOutcome& outcome);
@@ -96,6 +107,10 @@ class FrontEnd {
   MappingPort port_;
   Recovery recovery_;
   Odometry odometry_;
+  Standstill standstill_;
+  RepeatedFeatures repeated_;
+  double repeated_share_ = 0;  // of the present frame
+  Validity validity_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;
   StageListener* listener_ = nullptr;
@@ -103,11 +118,14 @@ class FrontEnd {
   State state_ = State::kInitialising;
   EstimatorCounts counts_;
   FrameResult result_;
+  TrackOutcome last_outcome_;  // accepted
 
   std::int32_t map_id_ = 0;
-  bool settled_ = false;
-  std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;  // that a map is being made from
-  int frames_since_keyframe_ = 0;
+  // That a map is being made from; the second is null where one frame's cameras are the pair.
+  std::pair<std::shared_ptr<Frame>, std::shared_ptr<Frame>> start_pair_;
+  // Time of the last frame whose cameras showed too little depth for a map.
+  std::optional<std::int64_t> no_depth_utime_;
+  std::int64_t keyframe_utime_ = 0;  // of the last keyframe sent
   // Frames from before the map, posed once it has settled.
   std::vector<std::shared_ptr<Frame>> waiting_;
   std::uint64_t last_before_map_ = 0;

@@ -1,7 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/mapping_port.h"
 
+#include <cmath>
+
 namespace farpoint::slam {
+
+namespace {
+
+std::int64_t microseconds(double ms) {
+  return static_cast<std::int64_t>(std::llround(1000.0 * ms));
+}
+
+}  // namespace
 
 MappingPort::MappingPort(const MappingConfig& config, MappingRings* rings)
     : config_(config), rings_(*rings) {}
@@ -26,18 +36,18 @@ std::uint64_t MappingPort::send_job() {
   return jobs_;
 }
 
-bool MappingPort::is_due(const MappingReply& reply, std::uint64_t frame_number,
-                         const ReplyLimit& limit) const {
+bool MappingPort::is_due(const MappingReply& reply, std::int64_t utime, const ReplyLimit& limit) const {
   if (!limit.by_delay) return reply.number <= limit.up_to;
-  int delay_frames = 0;
-  if (reply.stage == MappingStage::kQuick) delay_frames = config_.quick_view_delay_frames;
-  if (reply.stage == MappingStage::kFull) delay_frames = config_.full_view_delay_frames;
-  return reply.frame_number + static_cast<std::uint64_t>(delay_frames) <= frame_number;
+  double delay_ms = 0.0;
+  if (reply.stage == MappingStage::kStarted || reply.stage == MappingStage::kQuick)
+    delay_ms = config_.quick_view_delay_ms;
+  if (reply.stage == MappingStage::kFull) delay_ms = config_.full_view_delay_ms;
+  return reply.utime + microseconds(delay_ms) <= utime;
 }
 
-const MappingReply* MappingPort::take_reply(std::uint64_t frame_number, const ReplyLimit& limit) {
+const MappingReply* MappingPort::take_reply(std::int64_t utime, const ReplyLimit& limit) {
   const MappingReply* reply = rings_.replies.front();
-  if (reply == nullptr || !is_due(*reply, frame_number, limit)) return nullptr;
+  if (reply == nullptr || !is_due(*reply, utime, limit)) return nullptr;
   replies_taken_ = reply->number;
   if (reply->ends_job) --jobs_under_way_;
   return reply;
@@ -49,13 +59,8 @@ void MappingPort::release_reply() {
   rings_.replies.pop();
 }
 
-void MappingPort::begin_map(std::uint64_t frame_number) {
-  busy_until_frame_ = frame_number + static_cast<std::uint64_t>(config_.quick_view_delay_frames);
-}
-
 void MappingPort::give_up_map() {
   first_job_of_map_ = jobs_ + 1;
-  busy_until_frame_ = 0;
 }
 
 }  // namespace farpoint::slam

@@ -33,22 +33,17 @@ class MappingPort {
   // Sends it. Returns its number.
   std::uint64_t send_job();
 
-  // The oldest reply that the frame may take; null where none is due. In use until release_reply(). Each
-  // reply is given once.
-  [[nodiscard]] const MappingReply* take_reply(std::uint64_t frame_number, const ReplyLimit& limit);
+  // The oldest reply that the frame at `utime` may take; null where none is due. In use until
+  // release_reply(). Each reply is given once.
+  [[nodiscard]] const MappingReply* take_reply(std::int64_t utime, const ReplyLimit& limit);
   void release_reply();
   // False for a reply to a job of a map that was given up.
   [[nodiscard]] bool is_of_present_map(const MappingReply& reply) const {
     return reply.job_number >= first_job_of_map_;
   }
 
-  // Whether mapping would begin a job at this frame at once: only then is a keyframe sent.
-  [[nodiscard]] bool is_free(std::uint64_t frame_number) const {
-    return jobs_under_way_ == 0 && busy_until_frame_ <= frame_number;
-  }
-  // A new map was taken, of which `frame_number` is the newest frame. Lockstep charges its first view with
-  // the quick view's delay.
-  void begin_map(std::uint64_t frame_number);
+  // Whether mapping would begin a job at once: only then is a keyframe sent.
+  [[nodiscard]] bool is_free() const { return jobs_under_way_ == 0; }
   // The present map is given up: replies to the jobs sent so far are of a map that is gone.
   void give_up_map();
 
@@ -60,15 +55,13 @@ class MappingPort {
   [[nodiscard]] std::size_t jobs_under_way() const { return jobs_under_way_; }
 
  private:
-  [[nodiscard]] bool is_due(const MappingReply& reply, std::uint64_t frame_number,
-                            const ReplyLimit& limit) const;
+  [[nodiscard]] bool is_due(const MappingReply& reply, std::int64_t utime, const ReplyLimit& limit) const;
 
   const MappingConfig config_;
   MappingRings& rings_;
   std::uint64_t jobs_ = 0;  // sent
   std::size_t jobs_under_way_ = 0;
   std::uint64_t first_job_of_map_ = 1;
-  std::uint64_t busy_until_frame_ = 0;
   std::uint64_t replies_taken_ = 0;
 };
 

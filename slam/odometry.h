@@ -1,29 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame `odom`: continuous, because it integrates relative motion only. Corrections of the map, its unit
-// included, go into map_from_odom. A new map raises the reset counter.
+// The frame `odom`: integrates relative motion, and follows the map's corrections at a bounded rate, so that
+// a controller sees no step. A change of the map's unit goes into map_from_odom alone. A new map raises the
+// reset counter.
 #pragma once
 
 #include <cstdint>
 
+#include "slam/config.h"
 #include "slam/geometry/se3.h"
 
 namespace farpoint::slam {
 
 class Odometry {
  public:
-  // The body moved to this pose of the map. Adds the motion since the pose before, across lost frames too:
-  // both poses are of the same map.
-  void advance(const SE3& T_map_body);
+  explicit Odometry(const OdometryConfig& config) : config_(config) {}
+
+  // The body was at this pose of the map at `utime` (microseconds). Adds the motion since the pose before,
+  // across lost frames too, and a part of the map's corrections that are still missing in odom. `sigma`: of
+  // the pose's position, map units. A vehicle that moves by less than the noise takes no correction.
+  void advance(const SE3& T_map_body, std::int64_t utime, double sigma);
   // The map moved under the body: both poses are one, before and after the correction. `scale`: new map units
   // in an old one. odom keeps its pose and its unit.
   void correct(const SE3& T_map_body_before, const SE3& T_map_body_after, double scale = 1.0);
+  // The map has settled: its corrections flow into odom from here on. Those before went into map_from_odom.
+  void follow_map() { follows_ = true; }
   // A new map has another origin and unit. The reset counter rises, since the motion from the old map's last
   // pose to the first of the new one is unknown.
-  void begin_map() {
-    ++resets_;
-    has_last_ = false;
-    map_units_ = 1.0;
-  }
+  void begin_map();
 
   [[nodiscard]] const SE3& T_odom_body() const { return T_odom_body_; }
   // At this pose of the map.
@@ -31,10 +34,21 @@ class Odometry {
   [[nodiscard]] std::uint32_t reset_counter() const { return resets_; }
 
  private:
+  [[nodiscard]] SE3 target(const SE3& T_map_body) const;
+  void aim_at(const SE3& T_odom_body, const SE3& T_map_body);
+  void take_corrections(const SE3& T_map_body, std::int64_t utime, double sigma);
+
+  const OdometryConfig config_;
   SE3 T_odom_body_;
   SE3 T_map_body_last_;
   bool has_last_ = false;
+  bool follows_ = false;
   double map_units_ = 1.0;  // in a unit of odom
+  // Where odom would be had it followed the map at once: this, times the pose in odom's unit.
+  SE3 T_odom_map_;
+  // Place and time of the last correction taken: only motion beyond the noise since then allows another.
+  SE3 T_odom_body_corrected_;
+  std::int64_t corrected_utime_ = 0;
   std::uint32_t resets_ = 0;
 };
 

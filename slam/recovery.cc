@@ -13,8 +13,6 @@ constexpr int kRelocalisationFrames = 15;
 constexpr std::int64_t kRelocalisation_us = 1'500'000;
 // Missing frames in a row after which constant velocity is not used as a prior.
 constexpr int kGapFrames = 4;
-// A map with fewer keyframes is discarded, not retired, when it is lost: its unit has not settled.
-constexpr int kYoungMapKeyframes = 5;
 
 }  // namespace
 
@@ -37,9 +35,9 @@ bool Recovery::after_gap(std::int64_t utime) const {
   return interval_us_ > 0 && utime - seen_utime_ > kGapFrames * interval_us_;
 }
 
-Recovery::Verdict Recovery::note_lost(std::int64_t utime, bool settled, int keyframes) {
+Recovery::Verdict Recovery::note_lost(std::int64_t utime) {
   if (++lost_frames_ == 1) lost_since_utime_ = utime;
-  if (!settled || keyframes < kYoungMapKeyframes) return Verdict::kDiscardMap;
+  if (!ever_settled_) return Verdict::kDiscardMap;
   const bool tried_enough =
       lost_frames_ > kRelocalisationFrames && utime - lost_since_utime_ > kRelocalisation_us;
   return tried_enough ? Verdict::kRetireMap : Verdict::kSearchOn;
@@ -51,6 +49,7 @@ std::optional<RecordedFrame> Recovery::take_candidate() {
 
 void Recovery::begin_map() {
   lost_frames_ = 0;
+  ever_settled_ = false;
   candidate_.reset();
 }
 

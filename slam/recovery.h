@@ -31,8 +31,11 @@ class Recovery {
   void note_seen(std::int64_t utime);
   // A frame has an accepted pose.
   void note_tracked() { lost_frames_ = 0; }
-  // A frame was searched in vain. `settled` and `keyframes` are those of the present map.
-  [[nodiscard]] Verdict note_lost(std::int64_t utime, bool settled, int keyframes);
+  // The present map has settled: its unit has held once. It is kept when it is lost, whatever comes after.
+  void note_settled() { ever_settled_ = true; }
+  [[nodiscard]] bool ever_settled() const { return ever_settled_; }
+  // A frame was searched in vain.
+  [[nodiscard]] Verdict note_lost(std::int64_t utime);
   // After note_lost(): lost at the first such frame, relocalising from the second on.
   [[nodiscard]] State state() const { return lost_frames_ == 1 ? State::kLost : State::kRelocalising; }
 
@@ -46,7 +49,8 @@ class Recovery {
  private:
   [[nodiscard]] bool after_gap(std::int64_t utime) const;
 
-  int lost_frames_ = 0;  // searched in vain, one after another
+  bool ever_settled_ = false;  // the present map
+  int lost_frames_ = 0;        // searched in vain, one after another
   std::int64_t lost_since_utime_ = 0;
   std::optional<RecordedFrame> candidate_;
   // Of frames that showed something.

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "daemon/config/yaml_file.h"
+#include "drivers/mavlink/mavlink_link.h"
 #include "ipc/can_frame.h"
 #include "ipc/printable.h"
 
@@ -292,6 +293,12 @@ void check_can(const CanConfig& can, const ConfigOrigins& origins) {
   }
 }
 
+void check_mavlink(const MavlinkConfig& mavlink, const ConfigOrigins& origins) {
+  const std::string problem = drivers::MavlinkAddress::check(mavlink.link);
+  if (!problem.empty())
+    fail(place_of("mavlink.link", origins), "mavlink.link: " + quote(mavlink.link) + ", " + problem);
+}
+
 }  // namespace
 
 void load_config_file(const std::string& path, Config* config, ConfigOrigins* origins,
@@ -360,7 +367,7 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   };
   require_not_above("extractor.fast_threshold_min", "extractor.fast_threshold");
   require_not_above("tracking.min_inliers", "tracking.degraded_inliers");
-  require_not_above("keyframes.min_interval_frames", "keyframes.max_interval_frames");
+  require_not_above("keyframes.min_interval_s", "keyframes.max_interval_s");
   if (config.camera.rate_hz > 0.0 && config.camera.lost_after_s < 1.5 / config.camera.rate_hz) {
     fail(place_of("camera.lost_after_s", origins),
          "camera.lost_after_s: " + value_text(config, "camera.lost_after_s") +
@@ -370,7 +377,8 @@ void check_relations(const Config& config, const ConfigOrigins& origins) {
   require_not_above("camera.exposure_short_us", "camera.exposure_max_us");
   check_second_camera(config.camera, origins);
   check_can(config.can, origins);
-  require_not_above("mapping.quick_view_delay_frames", "mapping.full_view_delay_frames");
+  check_mavlink(config.mavlink, origins);
+  require_not_above("mapping.quick_view_delay_ms", "mapping.full_view_delay_ms");
   require_not_above("mapping.window_keyframes", "capacity.keyframes");
   require_not_above("landmarks.max_bearing", "capacity.landmarks");
 }

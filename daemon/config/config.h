@@ -41,6 +41,8 @@ struct RecordConfig {
 
 enum class CameraDriverChoice { kV4l2, kLibcamera, kFile, kLcm };
 enum class CameraFormatChoice { kAuto, kGrey, kNv12, kYuyv, kRgb24, kMjpeg };
+// Which cameras of a log the estimator uses.
+enum class CameraUse { kAll, kOne };
 enum class StampPointChoice { kAuto, kStartOfExposure, kStartOfReadout, kEndOfFrame };
 enum class ExposureChoice { kCamera, kAuto, kManual };
 
@@ -55,6 +57,7 @@ struct ExposureConfig {
 
 struct CameraConfig {
   int index = 0;  // the tracked camera, in the log and its calibration
+  CameraUse use = CameraUse::kAll;
   // Live.
   CameraDriverChoice driver = CameraDriverChoice::kV4l2;
   std::string device = "/dev/video0";
@@ -62,6 +65,7 @@ struct CameraConfig {
   std::string second_device = "none";
   std::string second_calibration = "/etc/farpoint/camera_1.yaml";
   int pair_tolerance_us = 5000;
+  std::string mask = "none", second_mask = "none";  // of camera 0 and camera 1; in replay too
   CameraFormatChoice format = CameraFormatChoice::kAuto;
   double rate_hz = 30;
   int buffers = 4;
@@ -107,6 +111,14 @@ struct CanConfig {
   std::string wheels_dbc = "none", wheel_signals = "none";
 };
 
+// Odometry for an autopilot, live.
+struct MavlinkConfig {
+  bool enabled = false;
+  std::string link = "udp:127.0.0.1:14580";  // udp:ADDRESS:PORT or serial:DEVICE:BAUD
+  double rate_hz = 30;                       // ODOMETRY messages a second
+  int system_id = 1, component_id = 197;
+};
+
 enum class SchedulingPolicy { kFifo, kRoundRobin };
 
 // What the threads ask for where the configuration leaves it open (daemon/system/core_plan.h).
@@ -148,6 +160,7 @@ struct Config {
   ScaleConfig scale;
   LcmConfig lcm;
   CanConfig can;
+  MavlinkConfig mavlink;
   RealtimeConfig realtime;
   WatchdogConfig watchdog;
   slam::EstimatorConfig estimator;

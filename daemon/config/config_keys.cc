@@ -97,6 +97,9 @@ std::vector<ConfigKey> make_keys() {
       integer("record.waiting_images", "images", 2, 300, FIELD(record.waiting_images)),
 
       integer("camera.index", "", 0, 15, FIELD(camera.index)),
+      text("camera.mask", FIELD(camera.mask)),
+      text("camera.second_mask", FIELD(camera.second_mask)),
+      enumeration("camera.use", {"all", "one"}, FIELD(camera.use)),
       enumeration("camera.driver", {"v4l2", "libcamera", "file", "lcm"}, FIELD(camera.driver)),
       text("camera.device", FIELD(camera.device)),
       text("camera.calibration", FIELD(camera.calibration)),
@@ -139,6 +142,12 @@ std::vector<ConfigKey> make_keys() {
       text("can.messages", FIELD(can.messages)),
       text("can.wheels_dbc", FIELD(can.wheels_dbc)),
       text("can.wheel_signals", FIELD(can.wheel_signals)),
+
+      boolean("mavlink.enabled", FIELD(mavlink.enabled)),
+      text("mavlink.link", FIELD(mavlink.link)),
+      number("mavlink.rate_hz", "Hz", 1, 100, FIELD(mavlink.rate_hz)),
+      integer("mavlink.system_id", "", 1, 255, FIELD(mavlink.system_id)),
+      integer("mavlink.component_id", "", 1, 255, FIELD(mavlink.component_id)),
 
       boolean("realtime.lock_memory", FIELD(realtime.lock_memory)),
       integer("realtime.stack_kb", "kB", 256, 16384, FIELD(realtime.stack_kb)),
@@ -185,7 +194,7 @@ std::vector<ConfigKey> make_keys() {
              FIELD(estimator.initialisation.min_parallax_rad)),
       integer("initialisation.min_landmarks", "landmarks", 10, 20000,
               FIELD(estimator.initialisation.min_landmarks)),
-      number("initialisation.max_frames", "frames", 2, 100000, FIELD(estimator.initialisation.max_frames)),
+      number("initialisation.max_age_s", "s", 0.1, 1000, FIELD(estimator.initialisation.max_age_s)),
 
       number("tracking.prior_search_px", "px", 1, 500, FIELD(estimator.tracking.prior_search_px)),
       number("tracking.local_search_px", "px", 0.5, 100, FIELD(estimator.tracking.local_search_px)),
@@ -196,11 +205,9 @@ std::vector<ConfigKey> make_keys() {
       number("tracking.pixel_sigma_px", "px", 0.01, 10, FIELD(estimator.tracking.pixel_sigma_px)),
 
       number("keyframes.tracked_ratio", "", 0.05, 1, FIELD(estimator.keyframes.tracked_ratio)),
-      integer("keyframes.min_interval_frames", "frames", 1, 1000,
-              FIELD(estimator.keyframes.min_interval_frames)),
-      integer("keyframes.max_interval_frames", "frames", 1, 100000,
-              FIELD(estimator.keyframes.max_interval_frames)),
-      number("keyframes.min_parallax_px", "px", 0.1, 1000, FIELD(estimator.keyframes.min_parallax_px)),
+      number("keyframes.min_interval_s", "s", 0, 100, FIELD(estimator.keyframes.min_interval_s)),
+      number("keyframes.max_interval_s", "s", 0, 10000, FIELD(estimator.keyframes.max_interval_s)),
+      number("keyframes.min_parallax_rad", "rad", 1e-4, 1, FIELD(estimator.keyframes.min_parallax_rad)),
 
       enumeration("landmarks.mode", {"baseline", "vmp"}, FIELD(estimator.landmarks.mode)),
       number("landmarks.promote_parallax_rad", "rad", 1e-5, 1,
@@ -219,10 +226,8 @@ std::vector<ConfigKey> make_keys() {
               FIELD(estimator.mapping.window_sightings)),
       integer("mapping.fixed_keyframes", "keyframes", 0, 10000, FIELD(estimator.mapping.fixed_keyframes)),
       integer("mapping.iterations", "steps", 1, 1000, FIELD(estimator.mapping.iterations)),
-      integer("mapping.quick_view_delay_frames", "frames", 1, 1000,
-              FIELD(estimator.mapping.quick_view_delay_frames)),
-      integer("mapping.full_view_delay_frames", "frames", 1, 1000,
-              FIELD(estimator.mapping.full_view_delay_frames)),
+      number("mapping.quick_view_delay_ms", "ms", 0, 10000, FIELD(estimator.mapping.quick_view_delay_ms)),
+      number("mapping.full_view_delay_ms", "ms", 0, 10000, FIELD(estimator.mapping.full_view_delay_ms)),
       choice("mapping.solver", {"schur", "ceres"}, FIELD(estimator.mapping.solver)),
 
       boolean("calibration.refine", FIELD(estimator.calibration.refine)),
@@ -231,6 +236,8 @@ std::vector<ConfigKey> make_keys() {
       number("calibration.distortion_sigma", "", 1e-6, 1, FIELD(estimator.calibration.distortion_sigma)),
       number("calibration.information_share", "", 1e-4, 1, FIELD(estimator.calibration.information_share)),
       integer("calibration.min_keyframes", "keyframes", 2, 1000, FIELD(estimator.calibration.min_keyframes)),
+      number("odometry.correction_share", "", 0, 1, FIELD(estimator.odometry.correction_share)),
+      number("odometry.correction_rad_per_s", "rad/s", 0, 10, FIELD(estimator.odometry.correction_rad_per_s)),
   };
 }
 
@@ -252,8 +259,15 @@ std::span<const ConfigKey> config_keys() {
 }
 
 std::span<const DroppedKey> dropped_keys() {
-  // None so far: since the first version keys were added only.
-  static const std::vector<DroppedKey> keys;
+  // Frames became seconds, and pixels angles.
+  static const std::vector<DroppedKey> keys{
+      {"initialisation.max_frames", "initialisation.max_age_s"},
+      {"keyframes.min_interval_frames", "keyframes.min_interval_s"},
+      {"keyframes.max_interval_frames", "keyframes.max_interval_s"},
+      {"keyframes.min_parallax_px", "keyframes.min_parallax_rad"},
+      {"mapping.quick_view_delay_frames", "mapping.quick_view_delay_ms"},
+      {"mapping.full_view_delay_frames", "mapping.full_view_delay_ms"},
+  };
   return keys;
 }
 

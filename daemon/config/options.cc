@@ -25,11 +25,13 @@ constexpr const char* kDescription =
 
 constexpr const char* kFooter =
     "Examples\n"
+    "  farpointd --check\n"
+    "  farpointd --check --replay run.lcm\n"
     "  farpointd --set camera.device=/dev/video0 --set camera.calibration=front.yaml --record run.lcm\n"
     "  farpoint import kitti /data/kitti 03 -o run.lcm\n"
     "  farpointd --replay run.lcm --lockstep --output out.lcm --trajectory final.tum --live-trajectory "
     "live.tum\n"
-    "  farpointd --replay run.lcm --speed 1 --output live.lcm --trajectory final.tum\n"
+    "  farpointd --replay run.lcm --output live.lcm --trajectory final.tum\n"
     "  farpointd --replay run.lcm --schedule recorded --schedule-log live.lcm --output again.lcm\n"
     "  farpointd --replay run.lcm --lockstep --can-log out.candump --set scale.assumed=1\n"
     "  farpointd --replay run.lcm --lockstep --lcm-url 'udpm://239.255.76.67:7667?ttl=0'    (watch with "
@@ -55,13 +57,18 @@ void add_options(CLI::App* app, Parsed* parsed) {
   app->add_option("--replay", o.replay, "LCM log to replay; '-' is standard input. Without: live")
       ->type_name("LOG");
   app->add_flag(
+      "--check", o.check,
+      "Look whether a live run, or with --replay that replay, would work here, print one line a thing (ok, "
+      "warning, error) and leave: status 0, or 2 with an error. Sets nothing, writes nothing");
+  app->add_flag("--json", o.json, "With --check: as JSON");
+  app->add_flag(
       "--lockstep", parsed->lockstep,
       "One frame after the other, everything in one order: the same log and configuration give the same "
       "bytes, whatever the machine's load");
   app->add_option(
          "--speed", o.speed,
          "As on the vehicle: capture, tracking, mapping and output on threads of their own, images at "
-         "X times the recorded pace")
+         "X times the recorded pace. 1 where neither this, --lockstep nor --schedule is given")
       ->type_name("X");
   app->add_option("--schedule", parsed->schedule,
                   "Repeat a threaded run byte for byte, on one thread: the same frames dropped, the same map "
@@ -124,12 +131,11 @@ void check(const Parsed& parsed) {
     throw UsageError("--schedule " + parsed.schedule + ": unknown, expected recorded");
   if (!o.schedule_log.empty() && parsed.schedule.empty())
     throw UsageError("--schedule-log without --schedule recorded, expected both");
+  if (o.check && o.replay == "-") throw UsageError("--check --replay -: expected a log that is a file");
+  if (o.json && !o.check) throw UsageError("--json without --check, expected both");
   if (parsed.lockstep && o.speed) throw UsageError("--lockstep and --speed exclude each other, expected one");
   if (o.speed && !(*o.speed > 0.0 && *o.speed <= kMaxSpeed))
     throw UsageError("--speed: expected a number above 0, at most 1000");
-  if (replays && !parsed.lockstep && !o.speed && parsed.schedule.empty())
-    throw UsageError(
-        "--lockstep, --speed X or --schedule recorded is missing beside --replay, expected one of them");
   // Two outputs in one file, or an output over the input, would destroy what the user wants to keep.
   std::map<std::filesystem::path, std::string> used;
   const auto claim = [&](const std::string& path, const std::string& name) {
@@ -181,6 +187,9 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   }
   check(parsed);
   result.options = parsed.options;
+  // A recording that is just replayed runs as on the vehicle.
+  const bool has_order = parsed.lockstep || result.options.speed || !parsed.schedule.empty();
+  if (!result.options.replay.empty() && !has_order) result.options.speed = 1.0;
   // The order is the recorded one then, whatever the pace.
   if (!parsed.schedule.empty()) {
     result.options.speed.reset();

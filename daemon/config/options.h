@@ -22,6 +22,8 @@ struct Options {
   // Present and empty: lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;
   std::vector<std::string> settings;  // "dotted.key=value", in order
+  bool check = false;                 // look whether the run would work, and leave
+  bool json = false;                  // with check
 };
 
 // Wrong use: what() is one line with what, where and what was expected. Exit status 2.

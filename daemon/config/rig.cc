@@ -59,8 +59,9 @@ double pyramid_share(const slam::PyramidOptions& options) {
 
 // As slam/frame_intake.cc counts them; a test compares the two.
 double pyramids(const slam::EstimatorConfig& config) {
-  constexpr double kHistoryFrames = 60.0, kInUse = 8.0;
-  const double looking = std::min(0.25 * config.initialisation.max_frames, kHistoryFrames) + 4.0;
+  constexpr double kHistoryFrames = 60.0, kCandidateSpacing_s = 0.2, kInUse = 8.0;
+  const double looking =
+      std::min(0.5 * config.initialisation.max_age_s / kCandidateSpacing_s, kHistoryFrames) + 4.0;
   return std::max(looking, config.capacity.window_images + 3.0) + kInUse;
 }
 
@@ -78,9 +79,9 @@ std::int64_t most_image_pixels(const Config& config) {
   return static_cast<std::int64_t>(config.image_mb * kBytesPerMb / image_bytes(config, 1));
 }
 
-void check_image_size(const calibration_t& calibration, const Config& config) {
-  const int index = config.camera.index;
-  if (index >= static_cast<int>(calibration.cameras.size())) return;  // make_rig() refuses it
+namespace {
+
+void check_image_size_of(const calibration_t& calibration, const Config& config, int index) {
   const camera_calibration_t& camera = calibration.cameras[static_cast<std::size_t>(index)];
   if (camera.width <= 0 || camera.height <= 0) return;
   const std::int64_t pixels = std::int64_t{camera.width} * camera.height;
@@ -92,6 +93,16 @@ void check_image_size(const calibration_t& calibration, const Config& config) {
                     config.estimator.capacity.window_images, config.image_mb));
 }
 
+}  // namespace
+
+void check_image_size(const calibration_t& calibration, const Config& config) {
+  const int index = config.camera.index;
+  if (index >= static_cast<int>(calibration.cameras.size())) return;  // make_rig() refuses it
+  check_image_size_of(calibration, config, index);
+  if (const std::optional<int> second = second_camera(calibration, config.camera))
+    check_image_size_of(calibration, config, *second);
+}
+
 slam::Rig make_rig(const calibration_t& calibration, int camera_index) {
   const int cameras = static_cast<int>(calibration.cameras.size());
   if (camera_index >= cameras) {
@@ -101,6 +112,27 @@ slam::Rig make_rig(const calibration_t& calibration, int camera_index) {
   const camera_calibration_t& camera = calibration.cameras[static_cast<std::size_t>(camera_index)];
   slam::Rig rig;
   rig.cameras.push_back({camera.name, camera_of(camera, camera_index), pose_of(camera, camera_index)});
+  return rig;
+}
+
+std::optional<int> second_camera(const calibration_t& calibration, const CameraConfig& config) {
+  // Nearer than that, two cameras show one picture: no depth.
+  constexpr double kLeastBaseline_m = 0.005;
+  const int cameras = static_cast<int>(calibration.cameras.size());
+  if (config.use == CameraUse::kOne || config.index >= cameras) return {};
+  const slam::SE3 T_body_first = make_rig(calibration, config.index).cameras.front().T_body_camera;
+  for (int i = 0; i < cameras; ++i) {
+    if (i == config.index) continue;
+    const slam::SE3 T_body_camera = make_rig(calibration, i).cameras.front().T_body_camera;
+    if ((T_body_camera.t - T_body_first.t).norm() >= kLeastBaseline_m) return i;
+  }
+  return {};
+}
+
+slam::Rig make_rig(const calibration_t& calibration, const CameraConfig& config) {
+  slam::Rig rig = make_rig(calibration, config.index);
+  if (const std::optional<int> second = second_camera(calibration, config))
+    rig.cameras.push_back(make_rig(calibration, *second).cameras.front());
   return rig;
 }
 

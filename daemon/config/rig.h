@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "daemon/config/config.h"
@@ -15,6 +16,12 @@ namespace farpoint::daemon {
 // Returns the tracked camera's pose on the body and its model. Throws InputError for an incomplete or invalid
 // calibration: unknown model, impossible numbers, no rotation.
 [[nodiscard]] slam::Rig make_rig(const calibration_t& calibration, int camera_index);
+
+// Index of the calibration's camera that is used beside the tracked one: the first other one that stands
+// apart from it. None where camera.use is 'one', and where there is no such camera.
+[[nodiscard]] std::optional<int> second_camera(const calibration_t& calibration, const CameraConfig& config);
+// The tracked camera and, where there is one, the second.
+[[nodiscard]] slam::Rig make_rig(const calibration_t& calibration, const CameraConfig& config);
 
 // Memory for images of one camera: pyramids, and working memory of the extractor.
 [[nodiscard]] double image_bytes(const Config& config, std::int64_t pixels);

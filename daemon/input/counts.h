@@ -28,6 +28,9 @@ struct OutputCounts {
   std::int32_t side_missing = 0;
   std::int64_t side_failures = 0;
   std::int8_t can_state = 0;  // drivers::CanState
+  // Of MAVLink, as status_t has them.
+  std::int64_t mavlink_sent = 0, mavlink_without_scale = 0, mavlink_without_pose = 0;
+  std::int64_t mavlink_send_errors = 0, mavlink_received = 0, mavlink_round_trip_us = -1;
 };
 
 }  // namespace farpoint::daemon

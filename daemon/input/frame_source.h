@@ -18,9 +18,11 @@ namespace farpoint::daemon {
 struct SourceFrame {
   drivers::CameraFrame meta;
   const ipc::GreyImage* image = nullptr;
+  const ipc::GreyImage* second = nullptr;  // of the second camera, exposed with it; null: none
 
-  [[nodiscard]] slam::ImageView view() const {
-    return {image->data(), image->width_px, image->height_px, image->width_px};
+  [[nodiscard]] slam::ImageView view() const { return view_of(*image); }
+  [[nodiscard]] static slam::ImageView view_of(const ipc::GreyImage& image) {
+    return {image.data(), image.width_px, image.height_px, image.width_px};
   }
 };
 
@@ -34,6 +36,8 @@ class FrameSource {
   [[nodiscard]] virtual bool next(SourceFrame* frame, StageClock* clock) = 0;
   // Swaps the last image of next() with another, without a copy.
   virtual void swap_image(ipc::GreyImage* image) = 0;
+  // The same of the second camera's. Precondition: next() gave one.
+  virtual void swap_second(ipc::GreyImage* image) = 0;
   // Valid after the first image of next().
   [[nodiscard]] virtual const calibration_t& calibration() const = 0;
   [[nodiscard]] virtual InputCounts counts() const = 0;

@@ -4,7 +4,9 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/config/rig.h"
 
@@ -13,7 +15,9 @@ namespace {
 
 drivers::LogSource open_source(const std::string& path, const Config& config) {
   try {
-    return drivers::LogSource(path, most_image_pixels(config), config.camera.index);
+    const bool all = config.camera.use == CameraUse::kAll;
+    return drivers::LogSource(path, most_image_pixels(config),
+                              all ? drivers::LogSource::kAllCameras : config.camera.index);
   } catch (const std::runtime_error& error) {
     const std::string what = error.what();
     const bool says = what.find("expected") != std::string::npos;
@@ -42,25 +46,12 @@ LogFrameSource::LogFrameSource(const std::string& path, const Config& config)
 
 bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   drivers::LogItem item;
-  while (source_.next(&item)) {
-    offset_ = item.offset;
-    if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
-    feed(item);
-    if (item.kind != drivers::LogItemKind::kImage || item.camera != config_.camera.index) continue;
-    if (!calibration_) {
-      ++before_calibration_;
-      continue;
-    }
-    const StageScope scope(clock, timing_t::STAGE_DECODE);
-    const ipc::ImageStatus status = source_.decode(item, &image_);
-    if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
-    if (status != ipc::ImageStatus::kOk) {
-      say_undecodable(status);
-      continue;
-    }
-    *frame = {{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &image_};
-    gave_image_ = true;
-    given_utime_ = item.utime;
+  while (!may_give() && !ended_) {
+    ended_ = !source_.next(&item);
+    if (!ended_) take(item, clock);
+  }
+  if (!firsts_.empty()) {
+    give(frame);
     return true;
   }
   if (!source_.damage().read_error.empty()) {
@@ -68,6 +59,68 @@ bool LogFrameSource::next(SourceFrame* frame, StageClock* clock) {
   }
   if (!gave_image_) refuse_empty();
   return false;
+}
+
+void LogFrameSource::take(const drivers::LogItem& item, StageClock* clock) {
+  offset_ = item.offset;
+  if (item.kind == drivers::LogItemKind::kCalibration) take_calibration(*item.calibration);
+  feed(item);
+  if (item.kind != drivers::LogItemKind::kImage) return;
+  if (item.camera == config_.camera.index) {
+    if (calibration_)
+      decode(item, clock, &firsts_);
+    else
+      ++before_calibration_;
+  } else if (item.camera == second_camera_) {
+    decode(item, clock, &seconds_);
+  }
+}
+
+void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, WaitingImages* out) {
+  const StageScope scope(clock, timing_t::STAGE_DECODE);
+  const ipc::ImageStatus status = source_.decode(item, &decoded_);
+  if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
+  if (status != ipc::ImageStatus::kOk) return say_undecodable(status);
+  out->push({item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &decoded_);
+}
+
+// Precondition: an image of the first camera waits.
+void LogFrameSource::forget_past_seconds() {
+  const std::int64_t oldest = firsts_.front().utime - config_.camera.pair_tolerance_us;
+  while (!seconds_.empty() && seconds_.front().utime < oldest) seconds_.drop();
+}
+
+bool LogFrameSource::may_give() {
+  if (firsts_.empty()) return false;
+  forget_past_seconds();
+  return !second_camera_ || !seconds_.empty() || firsts_.size() > kAhead;
+}
+
+void LogFrameSource::give(SourceFrame* frame) {
+  forget_past_seconds();
+  *frame = {firsts_.front(), &image_, nullptr};
+  firsts_.pop(&image_);
+  if (!seconds_.empty() && seconds_.front().utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {
+    seconds_.pop(&second_image_);
+    frame->second = &second_image_;
+  }
+  gave_image_ = true;
+  given_utime_ = frame->meta.utime;
+}
+
+std::size_t LogFrameSource::second_pixels() const {
+  if (!second_camera_) return 0;
+  const auto& camera = calibration_->cameras[static_cast<std::size_t>(*second_camera_)];
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
+void LogFrameSource::reserve_waiting() {
+  const auto& camera = calibration_->cameras[static_cast<std::size_t>(config_.camera.index)];
+  const std::size_t first = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = std::max(first, second_pixels());  // buffers change places
+  firsts_.reserve(pixels);
+  seconds_.reserve(pixels);
+  for (ipc::GreyImage* image : {&image_, &second_image_, &decoded_}) image->pixels.reserve(pixels);
 }
 
 // Once: the counts say how many follow.
@@ -108,6 +161,8 @@ void LogFrameSource::take_calibration(const calibration_t& calibration) {
       throw InputError(name_ + ": " + error.what());
     }
     calibration_ = calibration;
+    second_camera_ = second_camera(calibration, config_.camera);
+    if (second_camera_) reserve_waiting();
     return;
   }
   if (calibration_hash(calibration) == calibration_hash(*calibration_)) return;

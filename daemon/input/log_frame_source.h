@@ -11,6 +11,7 @@
 #include "daemon/config/config.h"
 #include "daemon/input/frame_source.h"
 #include "daemon/input/measurement_feed.h"
+#include "daemon/input/waiting_images.h"
 #include "drivers/log/log_source.h"
 
 namespace farpoint::daemon {
@@ -29,6 +30,9 @@ class LogFrameSource final : public FrameSource {
   // `feed` outlives its use.
   void feed_to(MeasurementFeed* feed);
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
+  void swap_second(ipc::GreyImage* image) override { std::swap(*image, second_image_); }
+  // Of the second camera's images; 0 without one.
+  [[nodiscard]] std::size_t second_pixels() const;
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
   [[nodiscard]] double progress() const override;
@@ -42,7 +46,13 @@ class LogFrameSource final : public FrameSource {
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
+  void take(const drivers::LogItem& item, StageClock* clock);
+  void decode(const drivers::LogItem& item, StageClock* clock, WaitingImages* out);
+  void forget_past_seconds();
+  [[nodiscard]] bool may_give();
+  void give(SourceFrame* frame);
   void take_calibration(const calibration_t& calibration);
+  void reserve_waiting();
   void feed(const drivers::LogItem& item);
   void say_undecodable(ipc::ImageStatus status);
   void keep_early(const drivers::LogItem& item);
@@ -63,6 +73,13 @@ class LogFrameSource final : public FrameSource {
   std::deque<wheels_t> early_wheels_;
   std::int64_t given_utime_ = 0;  // of the last image of next()
   ipc::GreyImage image_;
+  // With a second camera an image waits for its partner until a later one of that camera, or kAhead more of
+  // its own have come: the log's reader holds a doubtful image for one period.
+  static constexpr std::size_t kAhead = 2;
+  std::optional<int> second_camera_;
+  WaitingImages firsts_, seconds_;
+  ipc::GreyImage second_image_, decoded_;
+  bool ended_ = false;
   double file_bytes_ = -1.0;
   std::uint64_t offset_ = 0;
 };

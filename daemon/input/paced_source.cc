@@ -29,6 +29,8 @@ CaptureStatus PacedSource::next(const std::atomic<bool>& stop, CapturedImage* im
   if (!started_) start_s_ = steady_s();
   started_ = true;
   source_.swap_image(&image->image);
+  image->has_second = frame_.second != nullptr;
+  if (image->has_second) source_.swap_second(&image->second);
   image->meta = frame_.meta;
   image->in = source_.counts();
   image->progress = source_.progress();

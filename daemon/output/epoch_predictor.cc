@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "daemon/output/extrapolation.h"
+#include "daemon/output/reasons.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -35,28 +36,6 @@ ipc::CanScaleSource scale_source(slam::ScaleState scale) {
       break;
   }
   return ipc::CanScaleSource::kNotAvailable;
-}
-
-ipc::CanReason reason_of(slam::State state) {
-  switch (state) {
-    case slam::State::kStarting:
-      return ipc::CanReason::kNoImageYet;
-    case slam::State::kInitialising:
-      return ipc::CanReason::kMapNotStarted;
-    case slam::State::kSettling:
-      return ipc::CanReason::kMapSettling;
-    case slam::State::kTracking:
-      return ipc::CanReason::kNone;
-    case slam::State::kDegraded:
-      return ipc::CanReason::kFewLandmarks;
-    case slam::State::kLost:
-      return ipc::CanReason::kTrackingLost;
-    case slam::State::kRelocalising:
-      return ipc::CanReason::kPlaceNotRecognised;
-    case slam::State::kNoCamera:
-      return ipc::CanReason::kNoCamera;
-  }
-  return ipc::CanReason::kNotAvailable;
 }
 
 }  // namespace
@@ -119,19 +98,19 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
   return epoch;
 }
 
-ipc::CanReason EpochPredictor::reason(bool in_time) const {
+ipc::Reason EpochPredictor::reason(bool in_time) const {
   const slam::State state = last_.result.state;
-  if (last_.calibration_contradicted) return ipc::CanReason::kCalibrationContradicted;
-  if (state == slam::State::kNoCamera) return ipc::CanReason::kNoCamera;
-  if (!in_time) return ipc::CanReason::kNoPoseInTime;
-  if (slam::is_valid(state) && !last_.valid) return ipc::CanReason::kNumberOutOfRange;
-  return reason_of(state);
+  if (last_.calibration_contradicted) return ipc::Reason::kCalibrationContradicted;
+  if (state == slam::State::kNoCamera) return ipc::Reason::kNoCamera;
+  if (!in_time) return ipc::Reason::kNoPoseInTime;
+  if (slam::is_valid(state) && !last_.valid) return ipc::Reason::kNumberOutOfRange;
+  return reason_of(last_.result);
 }
 
 ipc::OdometryEpoch EpochPredictor::farewell(std::int64_t now_us) const {
   ipc::OdometryEpoch epoch = head(now_us);
   epoch.state = ipc::kCanStateStopped;
-  epoch.reason = ipc::CanReason::kStopped;
+  epoch.reason = ipc::Reason::kStopped;
   epoch.levelled = epoch.body_is_camera = ipc::CanYesNo::kNotAvailable;
   return epoch;
 }

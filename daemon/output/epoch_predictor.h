@@ -38,7 +38,7 @@ class EpochPredictor {
 
  private:
   [[nodiscard]] ipc::OdometryEpoch head(std::int64_t now_us) const;
-  [[nodiscard]] ipc::CanReason reason(bool in_time) const;
+  [[nodiscard]] ipc::Reason reason(bool in_time) const;
   [[nodiscard]] std::int64_t frame_period_us() const;
   void note_period(std::int64_t image_us);
 

@@ -4,15 +4,28 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <string_view>
+#include <array>
+#include <limits>
 
 #include "daemon/output/rate.h"
+#include "daemon/output/reasons.h"
 
 namespace farpoint::daemon {
 namespace {
 
-constexpr std::string_view kCalibrationContradicted =
-    "the images contradict the calibration (another camera, focus or resolution?): no pose is valid";
+// In memory reserved at the start.
+void note_reason(const slam::FrameResult& result, bool contradicted, status_t* s) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const bool valid = slam::is_valid(result.state);
+  const ipc::Reason reason = contradicted ? ipc::Reason::kCalibrationContradicted
+                             : valid      ? ipc::Reason::kNone
+                                          : reason_of(result);
+  s->reason = static_cast<std::int8_t>(reason);
+  s->reason_value = contradicted || valid ? kNone : result.refusal.value;
+  s->reason_wanted = contradicted || valid ? kNone : result.refusal.wanted;
+  std::array<char, ipc::kReasonText> text;
+  s->message = ipc::reason_text(reason, s->reason_value, s->reason_wanted, text);
+}
 
 }  // namespace
 
@@ -34,7 +47,7 @@ FrameReporter::FrameReporter(const Config& config, const Names& names, std::vect
   status_.configuration_hash = names.configuration_hash;
   status_.calibration_hash = names.calibration_hash;
   status_.boot_counter = names.boot_counter;
-  status_.message.reserve(kCalibrationContradicted.size());
+  status_.message.reserve(ipc::kReasonText);
 }
 
 const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCounts& out) {
@@ -59,6 +72,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   note_state(frame_.result);
   silence_.counts = package->counts;
   silence_.chance = package->chance;
+  silence_.camera = package->camera;
   if (publisher_->has_sinks()) {
     publisher_->publish(
         ipc::kTimingChannel, result.utime,
@@ -174,6 +188,12 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.can_received = out.can_received;
   s.can_state = out.can_state;
   s.lcm_send_errors = static_cast<std::int64_t>(publisher_->network_errors());
+  s.mavlink_sent = out.mavlink_sent;
+  s.mavlink_without_scale = out.mavlink_without_scale;
+  s.mavlink_without_pose = out.mavlink_without_pose;
+  s.mavlink_send_errors = out.mavlink_send_errors;
+  s.mavlink_received = out.mavlink_received;
+  s.mavlink_round_trip_us = out.mavlink_round_trip_us;
   s.images_not_recorded = in.not_recorded;
   s.log_write_errors = static_cast<std::int64_t>(publisher_->log_errors()) + out.can_not_logged;
   s.side_missing = out.side_missing;
@@ -182,8 +202,13 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.keyframes = static_cast<std::int32_t>(counts.keyframes);
   s.landmarks = static_cast<std::int32_t>(counts.landmarks);
   s.vmps = static_cast<std::int32_t>(counts.mapping.vmp_alive);
-  s.message = counts.mapping.calibration_contradicted ? kCalibrationContradicted : std::string_view{};
+  note_reason(r, counts.mapping.calibration_contradicted, &s);
   s.times_lost = static_cast<std::int64_t>(counts.lost);
+  const CameraNote& camera = package.camera;
+  s.camera_format = camera.format == drivers::CameraFormat::kAuto ? "" : to_string(camera.format);
+  s.camera_rate_hz = camera.rate_hz;
+  s.camera_exposure_us = camera.exposure_us;
+  s.camera_gain = camera.gain;
   s.capture_queue = chance.capture_queue;
   s.mapping_queue = r.jobs_under_way;
   s.publish_queue = chance.publish_queue;

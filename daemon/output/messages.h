@@ -3,6 +3,7 @@
 // bytes.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <span>
 #include <string>
@@ -12,6 +13,7 @@
 #include "daemon/config/config.h"
 #include "daemon/output/pose_sink.h"
 #include "ipc/message.h"
+#include "ipc/reason.h"
 #include "slam/inspection.h"
 
 namespace farpoint::daemon {
@@ -42,6 +44,9 @@ struct RunEnd {
   slam::FrameResult last;               // with scale.assumed applied
   std::int64_t frames = 0;              // of the recording, posed or not
   std::int64_t frames_valid = 0;
+  // By reason: frames without a valid pose, and the numbers of the last one.
+  std::array<std::int64_t, ipc::kReasons> refused{};
+  std::array<slam::Refusal, ipc::kReasons> refusals{};
   std::vector<std::int64_t> live_utimes;                   // of valid frames, ascending
   std::vector<slam::MapTrajectory> trajectories;           // most frames first
   std::vector<slam::LandmarkInfo> landmarks;               // alive, of all maps

@@ -41,6 +41,17 @@ class Closing {
   std::string problems_;
 };
 
+void add_mavlink(const MavlinkCounts& of, OutputCounts* counts) {
+  counts->mavlink_sent = of.sent;
+  counts->mavlink_without_scale = of.without_scale;
+  counts->mavlink_without_pose = of.without_pose;
+  counts->mavlink_send_errors = of.send_errors;
+  counts->mavlink_received = of.received;
+  counts->mavlink_round_trip_us = of.round_trip_us;
+  if (!of.is_open) counts->side_missing |= 1 << static_cast<int>(SideFunction::kMavlink);
+  counts->side_failures += of.failed_openings;
+}
+
 }  // namespace
 
 Outputs::Outputs(const Options& options, const Config& config, std::int32_t boot_counter)
@@ -62,6 +73,7 @@ Outputs::Outputs(const Options& options, const Config& config, SideFunctions* si
   open_files(config);
   open_network(config);
   open_bus(config);
+  open_mavlink(config);
 }
 
 void Outputs::count_start(const Config& config) {
@@ -78,6 +90,7 @@ std::vector<PoseSink*> Outputs::sinks() {
   std::vector<PoseSink*> all;
   if (bus_) all.push_back(bus_.get());
   if (replay_) all.push_back(replay_.get());
+  if (mavlink_) all.push_back(mavlink_.get());
   if (live_) all.push_back(live_.get());
   return all;
 }
@@ -90,6 +103,7 @@ OutputCounts Outputs::counts() const {
     counts.side_missing = side_->missing();
     counts.side_failures = side_->failures();
   }
+  if (mavlink_) add_mavlink(mavlink_->counts(), &counts);
   if (!bus_) return counts;
   counts.can_not_logged = bus_->not_logged();
   counts.can_bus_offs = static_cast<std::int64_t>(bus_->bus_counts().bus_off);
@@ -112,12 +126,14 @@ void Outputs::set_body_is_camera(bool is_camera) {
 }
 
 void Outputs::start_writing(const RealtimeConfig& config, RealtimeReport* report) {
+  if (mavlink_) mavlink_->start(config, report);
   if (!files_ || (!writes_files(options_) && options_.can_log.empty())) return;
   if (bus_) files_->add_turn([this] { bus_->write_log(); });
   files_->start(config, report);
 }
 
 void Outputs::farewell() {
+  if (mavlink_) mavlink_->stop();
   if (bus_) bus_->farewell();
 }
 
@@ -168,6 +184,9 @@ Outputs::Paths Outputs::close_buses() {
 void Outputs::warn_of_losses() const {
   if (publisher_.network_errors() > 0) spdlog::warn("{} messages were not sent", publisher_.network_errors());
   if (counts().can_send_errors > 0) spdlog::warn("{} CAN frames were not sent", counts().can_send_errors);
+  if (mavlink_)
+    if (const MavlinkCounts of = mavlink_->counts(); of.without_scale > 0)
+      spdlog::warn("{} MAVLink ODOMETRY messages were not sent: no sensor gave metres", of.without_scale);
   const std::uint64_t dropped = files_ ? files_->dropped() : 0;
   if (dropped == 0) return;
   const std::string problem =
@@ -269,6 +288,12 @@ void Outputs::open_bus(const Config& config) {
   } catch (const std::runtime_error& error) {
     spdlog::warn("{}; the run goes on without the bus", error.what());
   }
+}
+
+void Outputs::open_mavlink(const Config& config) {
+  if (!config.mavlink.enabled) return;
+  mavlink_ = std::make_unique<MavlinkOutput>(config.mavlink);
+  spdlog::info("MAVLink: ODOMETRY to {} at {} Hz", config.mavlink.link, config.mavlink.rate_hz);
 }
 
 EpochOptions Outputs::epoch_options(const Config& config) const {

@@ -13,6 +13,7 @@
 #include "daemon/output/can_bus.h"
 #include "daemon/output/can_replay.h"
 #include "daemon/output/file_writer.h"
+#include "daemon/output/mavlink_output.h"
 #include "daemon/output/messages.h"
 #include "daemon/output/publisher.h"
 #include "daemon/output/trajectory_file.h"
@@ -80,6 +81,7 @@ class Outputs {
   void open_network(const Config& config);
   void open_live_network(const std::string& url);
   void open_bus(const Config& config);
+  void open_mavlink(const Config& config);
   Paths close_log();
   [[nodiscard]] Paths write_trajectories(const RunEnd& end) const;
   Paths close_live_trajectory();
@@ -99,6 +101,7 @@ class Outputs {
   // Live and in a threaded replay the bus has the steady clock; a replay's log has the recording's.
   std::unique_ptr<CanBus> bus_;
   std::unique_ptr<CanReplay> replay_;
+  std::unique_ptr<MavlinkOutput> mavlink_;  // live, where it is enabled
   Publisher publisher_;
   WheelSource* wheels_ = nullptr;
 };

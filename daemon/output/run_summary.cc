@@ -5,6 +5,8 @@
 #include <spdlog/fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "daemon/system/stage_clock.h"
 
@@ -68,6 +70,18 @@ std::string forgotten_text(const slam::EstimatorCounts& counts) {
                      counts.mapping.keyframes_forgotten, counts.mapping.landmarks_forgotten);
 }
 
+// Why most poses were not valid, where the run ended without one or fewer than half were.
+std::string reason_text(const RunEnd& end) {
+  if (end.frames == 0 || (slam::is_valid(end.last.state) && 2 * end.frames_valid >= end.frames)) return "";
+  const auto most = std::max_element(end.refused.begin(), end.refused.end());
+  const auto index = static_cast<std::size_t>(most - end.refused.begin());
+  std::array<char, ipc::kReasonText> buffer;
+  const slam::Refusal& numbers = end.refusals.at(index);
+  const std::string_view text =
+      ipc::reason_text(static_cast<ipc::Reason>(index), numbers.value, numbers.wanted, buffer);
+  return fmt::format("; {} frames without a valid pose: {}", *most, text);
+}
+
 const char* calibration_text(const RunEnd& end) {
   return end.counts.mapping.calibration_contradicted ? "; the images contradict the calibration" : "";
 }
@@ -84,11 +98,11 @@ std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t fra
   return fmt::format(
       "farpointd: {}: {} frames, {} tracked ({:.1f} %), {}{} map{}, lost {} time{}, scale {}; {:.1f} ms a "
       "frame (CPU "
-      "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}",
+      "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}{}",
       outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames),
       initialised_text(end), maps, maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s",
       scale_text(end.last.scale), cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()),
-      quantile(cpu_ms, 0.99), static_cast<double>(peak_resident_bytes()) / kMegabyte,
+      quantile(cpu_ms, 0.99), static_cast<double>(peak_resident_bytes()) / kMegabyte, reason_text(end),
       forgotten_text(end.counts), calibration_text(end), refused_text(in, frames_dropped),
       written.empty() ? "" : "; wrote ", fmt::join(written, " "));
 }

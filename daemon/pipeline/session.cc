@@ -9,6 +9,7 @@
 
 #include "daemon/config/build_info.h"
 #include "daemon/config/errors.h"
+#include "daemon/config/mask_file.h"
 #include "daemon/config/rig.h"
 #include "daemon/output/outputs.h"
 
@@ -142,7 +143,8 @@ void Session::publish_landmarks() {
 
 std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
                                       Outputs* outputs, bool with_schedule, bool keep_times) {
-  const slam::Rig rig = make_rig(calibration, config.camera.index);
+  slam::Rig rig = make_rig(calibration, config.camera);
+  read_masks(config.camera, calibration, &rig);
   outputs->set_body_is_camera(calibration.body_name.empty());
   try {
     const Session::Options options{calibration_hash(calibration), outputs->boot_counter(), with_schedule,

@@ -74,8 +74,9 @@ class Session {
   RunTally tally_;
 };
 
-// A session for the rig of `calibration` (see the constructor). Throws InputError where the calibration
-// cannot be used, ConfigError where the configuration cannot or wants more memory than there is.
+// A session for the rig of `calibration` (see the constructor), with the cameras that `config` uses. Throws
+// InputError where the calibration cannot be used, ConfigError where the configuration cannot or wants more
+// memory than there is.
 [[nodiscard]] std::unique_ptr<Session> make_session(const Config& config, const calibration_t& calibration,
                                                     Outputs* outputs, bool with_schedule,
                                                     bool keep_times = true);

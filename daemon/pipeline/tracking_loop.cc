@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/pipeline/tracking_loop.h"
 
+#include <span>
+
 namespace farpoint::daemon {
 
 TrackingLoop::TrackingLoop(slam::Estimator* estimator, ImageQueue* images, PackageRing* packages,
@@ -51,12 +53,17 @@ void TrackingLoop::track(CapturedImage* image, FramePackage* package) {
   // The thread's CPU time costs a system call here: the output reads it.
   const double began_s = steady_s();
   fill_chance(*image, &package->chance);
-  const slam::ImageView view{image->image.data(), image->image.width_px, image->image.height_px,
-                             image->image.width_px};
-  package->result =
-      estimator_.track({image->meta.utime, image->meta.sequence, 0, view, package->chance.features_asked});
+  const slam::ImageView view = SourceFrame::view_of(image->image);
+  slam::FrameInput input{image->meta.utime, image->meta.sequence, 0, view, package->chance.features_asked};
+  slam::CameraImage second{1, {}};
+  if (image->has_second) {
+    second.image = SourceFrame::view_of(image->second);
+    input.others = std::span(&second, 1);
+  }
+  package->result = estimator_.track(input);
   package->counts = estimator_.counts();
   package->in = image->in;
+  package->camera = image->camera;
   package->due_s = image->due_s;
   package->progress = image->progress;
   package->clock.new_frame();

@@ -24,6 +24,7 @@ enum class SideFunction : std::uint8_t {
   kCanLog = 3,
   kRecording = 4,
   kLogFile = 5,
+  kMavlink = 6,
 };
 
 class SideFunctions {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/can/link_info.h"
 
+#include <linux/can/netlink.h>
 #include <linux/netlink.h>
 #include <linux/rtnetlink.h>
 #include <net/if.h>
+#include <net/if_arp.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -31,23 +34,36 @@ std::size_t ask(int fd, int index, char* answer, std::size_t room) {
   return got > 0 ? static_cast<std::size_t>(got) : 0;
 }
 
-std::optional<LinkInfo> parse(const char* answer, std::size_t bytes) {
-  const auto* head = reinterpret_cast<const nlmsghdr*>(answer);
-  if (bytes < sizeof(Request) || head->nlmsg_type != RTM_NEWLINK || head->nlmsg_len > bytes) return {};
-  LinkInfo found;
-  std::size_t at = NLMSG_LENGTH(sizeof(ifinfomsg));
-  while (at + sizeof(rtattr) <= head->nlmsg_len) {
+// Calls take(type, data) for each attribute; stops at a damaged one.
+template <typename Take>
+void walk_attributes(std::span<const char> attributes, const Take& take) {
+  while (attributes.size() >= sizeof(rtattr)) {
     rtattr attribute{};
-    std::memcpy(&attribute, answer + at, sizeof attribute);
-    if (attribute.rta_len < sizeof attribute || at + attribute.rta_len > head->nlmsg_len) break;
-    const char* data = answer + at + sizeof attribute;
-    const std::size_t size = attribute.rta_len - sizeof attribute;
-    if (attribute.rta_type == IFLA_TXQLEN && size >= sizeof found.txqueuelen)
-      std::memcpy(&found.txqueuelen, data, sizeof found.txqueuelen);
-    if (attribute.rta_type == IFLA_QDISC) found.queue.assign(data, strnlen(data, size));
-    at += RTA_ALIGN(attribute.rta_len);
+    std::memcpy(&attribute, attributes.data(), sizeof attribute);
+    if (attribute.rta_len < sizeof attribute || attribute.rta_len > attributes.size()) return;
+    take(attribute.rta_type & NLA_TYPE_MASK,
+         attributes.subspan(sizeof attribute, attribute.rta_len - sizeof attribute));
+    attributes = attributes.subspan(std::min<std::size_t>(RTA_ALIGN(attribute.rta_len), attributes.size()));
   }
-  return found;
+}
+
+std::string text_of(std::span<const char> data) {
+  return {data.data(), strnlen(data.data(), data.size())};
+}
+
+void take_number(std::span<const char> data, std::uint32_t* number) {
+  if (data.size() >= sizeof *number) std::memcpy(number, data.data(), sizeof *number);
+}
+
+// The first member of can_bittiming is the bit rate.
+void take_link_kind(std::span<const char> attributes, LinkInfo* link) {
+  walk_attributes(attributes, [&](int type, std::span<const char> data) {
+    if (type == IFLA_INFO_KIND) link->kind = text_of(data);
+    if (type != IFLA_INFO_DATA || link->kind != "can") return;
+    walk_attributes(data, [&](int inner, std::span<const char> timing) {
+      if (inner == IFLA_CAN_BITTIMING) take_number(timing, &link->bitrate);
+    });
+  });
 }
 
 }  // namespace
@@ -62,7 +78,27 @@ std::optional<LinkInfo> read_link(const std::string& interface) {
   alignas(nlmsghdr) std::array<char, 16384> answer{};
   const std::size_t bytes = ask(fd, static_cast<int>(index), answer.data(), answer.size());
   close(fd);
-  return parse(answer.data(), bytes);
+  return parse_link({answer.data(), bytes});
+}
+
+std::optional<LinkInfo> parse_link(std::span<const char> answer) {
+  Request head;
+  if (answer.size() < sizeof head) return {};
+  std::memcpy(&head, answer.data(), sizeof head);
+  if (head.head.nlmsg_type != RTM_NEWLINK || head.head.nlmsg_len < sizeof head ||
+      head.head.nlmsg_len > answer.size())
+    return {};
+  LinkInfo found;
+  found.is_can = head.link.ifi_type == ARPHRD_CAN;
+  found.is_up = (head.link.ifi_flags & IFF_UP) != 0;
+  walk_attributes(answer.first(head.head.nlmsg_len).subspan(sizeof head),
+                  [&](int type, std::span<const char> data) {
+                    if (type == IFLA_TXQLEN) take_number(data, &found.txqueuelen);
+                    if (type == IFLA_MTU) take_number(data, &found.mtu);
+                    if (type == IFLA_QDISC) found.queue = text_of(data);
+                    if (type == IFLA_LINKINFO) take_link_kind(data, &found);
+                  });
+  return found;
 }
 
 std::string queue_problem(const LinkInfo& link, std::size_t frames) {

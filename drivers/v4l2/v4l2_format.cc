@@ -24,6 +24,18 @@ constexpr std::array<KnownFormat, 5> kFormats = {{{CameraFormat::kGrey, V4L2_PIX
                                                   {CameraFormat::kMjpeg, V4L2_PIX_FMT_MJPEG, 0}}};
 constexpr std::uint32_t kMaxEntries = 256;  // of one of the driver's lists
 constexpr double kRateTolerance = 0.98;
+constexpr const char* kNoFormat =
+    "it does not give images of the calibration's size in GREY, NV12, YUYV, RGB24 or MJPEG";
+
+struct Candidate {
+  const KnownFormat* known;
+  double fastest_hz, shortfall_hz;
+};
+// The best first.
+struct Candidates {
+  std::array<Candidate, kFormats.size()> all{};
+  std::size_t count = 0;
+};
 
 bool is_enumerated(V4l2System* system, const V4l2Node& node, std::uint32_t code) {
   for (std::uint32_t i = 0; i < kMaxEntries; ++i) {
@@ -138,6 +150,23 @@ bool is_wanted(const KnownFormat& known, const CameraOptions& options) {
   return options.format == CameraFormat::kAuto || options.format == known.format;
 }
 
+Candidates find_candidates(V4l2System* system, const V4l2Node& node, const CameraOptions& options) {
+  Candidates found;
+  auto& [all, count] = found;
+  for (const KnownFormat& known : kFormats) {
+    if (!is_wanted(known, options) || !is_enumerated(system, node, known.code)) continue;
+    if (!may_have_size(system, node, known.code, options)) continue;
+    const double fastest = fastest_hz(system, node, known.code, options);
+    const bool reached = fastest <= 0.0 || fastest >= kRateTolerance * options.rate_hz;
+    all[count++] = {&known, fastest, reached ? 0.0 : options.rate_hz - fastest};
+  }
+  // By insertion: the standard stable sort takes memory.
+  for (std::size_t i = 1; i < count; ++i)
+    for (std::size_t k = i; k > 0 && all[k].shortfall_hz < all[k - 1].shortfall_hz; --k)
+      std::swap(all[k], all[k - 1]);
+  return found;
+}
+
 }  // namespace
 
 std::uint32_t V4l2Node::buffer_type() const {
@@ -158,33 +187,26 @@ int identify(V4l2System* system, V4l2Node* node, const char** what) {
   return captures && (can & V4L2_CAP_STREAMING) != 0 ? 0 : -ENOTSUP;
 }
 
+int find_format(V4l2System* system, const V4l2Node& node, const CameraOptions& options,
+                OfferedFormat* offered, const char** what) {
+  const Candidates found = find_candidates(system, node, options);
+  *what = kNoFormat;
+  if (found.count == 0) return -ENOTSUP;
+  *offered = {found.all[0].known->format, found.all[0].fastest_hz};
+  return 0;
+}
+
 int agree_on_format(V4l2System* system, const V4l2Node& node, const CameraOptions& options,
                     AgreedFormat* agreed, const char** what) {
-  struct Candidate {
-    const KnownFormat* known;
-    double shortfall_hz;
-  };
-  std::array<Candidate, kFormats.size()> candidates{};
-  std::size_t count = 0;
-  for (const KnownFormat& known : kFormats) {
-    if (!is_wanted(known, options) || !is_enumerated(system, node, known.code)) continue;
-    if (!may_have_size(system, node, known.code, options)) continue;
-    const double fastest = fastest_hz(system, node, known.code, options);
-    const bool reached = fastest <= 0.0 || fastest >= kRateTolerance * options.rate_hz;
-    candidates[count++] = {&known, reached ? 0.0 : options.rate_hz - fastest};
-  }
-  // By insertion: the standard stable sort takes memory.
-  for (std::size_t i = 1; i < count; ++i)
-    for (std::size_t k = i; k > 0 && candidates[k].shortfall_hz < candidates[k - 1].shortfall_hz; --k)
-      std::swap(candidates[k], candidates[k - 1]);
-  for (std::size_t i = 0; i < count; ++i) {
-    const KnownFormat& known = *candidates[i].known;
+  const Candidates found = find_candidates(system, node, options);
+  for (std::size_t i = 0; i < found.count; ++i) {
+    const KnownFormat& known = *found.all[i].known;
     if (!set_format(system, node, known, options, &agreed->row_stride)) continue;
     agreed->format = known.format;
     agreed->rate_hz = set_rate(system, node, options.rate_hz);
     return 0;
   }
-  *what = "it does not give images of the calibration's size in GREY, NV12, YUYV, RGB24 or MJPEG";
+  *what = kNoFormat;
   return -ENOTSUP;
 }
 

@@ -27,6 +27,16 @@ struct AgreedFormat {
 // Checks the node's capabilities. Returns 0, or negative errno; *what names the failed step.
 [[nodiscard]] int identify(V4l2System* system, V4l2Node* node, const char** what);
 
+// A format that the driver's lists have.
+struct OfferedFormat {
+  CameraFormat format = CameraFormat::kAuto;
+  double fastest_hz = 0;  // at the options' size; 0: unknown
+};
+
+// The format that agree_on_format() tries first. Sets nothing. Returns and *what as there.
+[[nodiscard]] int find_format(V4l2System* system, const V4l2Node& node, const CameraOptions& options,
+                              OfferedFormat* offered, const char** what);
+
 // Sets format and rate. The size must be that of the options. Of the formats that reach the rate, or come
 // nearest, the one cheapest to convert to grey wins. Returns 0 or negative errno.
 [[nodiscard]] int agree_on_format(V4l2System* system, const V4l2Node& node, const CameraOptions& options,

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "slam/geometry/camera.h"
+#include "slam/geometry/image_mask.h"
 #include "slam/geometry/se3.h"
 
 namespace farpoint::slam {
@@ -16,6 +18,12 @@ struct RigCamera {
   std::string name;
   Camera camera;
   SE3 T_body_camera;
+  std::shared_ptr<const ImageMask> mask = nullptr;  // of the camera's size; null: every pixel shows the world
+
+  // Whether the square of half side `radius_px` around a pixel reaches into the mask.
+  [[nodiscard]] bool is_masked(const Eigen::Vector2d& pixel, double radius_px) const {
+    return mask != nullptr && mask->touches(pixel, radius_px);
+  }
 };
 
 // Rotation of an upright camera that looks along the body's x axis (body axes: x forward, y left, z up).

@@ -15,6 +15,8 @@ namespace {
 
 // Distance of corners from the edge of their level: the patch (15), the blur (3) and one to spare.
 constexpr int kBorder = 19;
+// What a corner and its descriptor depend on, to either side of it: the patch and the blur.
+constexpr int kSupport = kBorder - 1;
 // Blurred pixels exist from here on: a patch around the outermost corner reaches no further.
 constexpr int kBlurBorder = kBorder - kPatchRadiusPx;
 static_assert(kBlurBorder >= 3, "the blur reads three pixels to each side");
@@ -49,8 +51,8 @@ struct Extractor::Workspace {
   Workspace(int width, int height, const PyramidOptions& pyramid_options,
             const ExtractorOptions& extractor_options);
 
-  void detect(const Pyramid& pyramid, int l, const ImageView& mask);
-  void scan(const ImageView& image, float scale, const ImageView& mask, PixelBox box, int threshold,
+  void detect(const Pyramid& pyramid, int l, const ImageMask* mask);
+  void scan(const Pyramid& pyramid, int l, const ImageMask* mask, PixelBox box, int threshold,
             std::vector<Corner>* corners);
   void choose(const Pyramid& pyramid, int most);
   void blur(const ImageView& image);
@@ -108,15 +110,12 @@ Extractor::Workspace::Workspace(int width, int height, const PyramidOptions& pyr
 // Corners of at least `threshold` in `box`, added to *corners. A corner must be a maximum of its 3x3
 // neighbourhood, in the box or not; scores under the threshold count as 0, which takes nothing from a
 // stronger one.
-void Extractor::Workspace::scan(const ImageView& image, float scale, const ImageView& mask, PixelBox box,
+void Extractor::Workspace::scan(const Pyramid& pyramid, int l, const ImageMask* mask, PixelBox box,
                                 int threshold, std::vector<Corner>* corners) {
+  const ImageView image = pyramid.level(l);
+  const double scale = pyramid.scale(l), support_px = pyramid.support_px(l, kSupport);
   const auto masked = [&](int x, int y) {
-    if (mask.data == nullptr) return false;
-    const auto to_base = [scale](int p, int size) {
-      return std::clamp(static_cast<int>(std::lround((static_cast<float>(p) + 0.5F) * scale - 0.5F)), 0,
-                        size - 1);
-    };
-    return mask.data[to_base(y, mask.height_px) * mask.stride_bytes + to_base(x, mask.width_px)] == 0;
+    return mask != nullptr && mask->touches({(x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5}, support_px);
   };
   // Row y is scored, then row y - 1 has both neighbours.
   bool any[3] = {};
@@ -138,13 +137,13 @@ void Extractor::Workspace::scan(const ImageView& image, float scale, const Image
 }
 
 // Strong corners everywhere, then weak ones where a cell has none.
-void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView& mask) {
+void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageMask* mask) {
   Level& level = levels[static_cast<std::size_t>(l)];
   level.corners.clear();
   const ImageView image = pyramid.level(l);
   const PixelBox inside{kBorder, kBorder, image.width_px - kBorder, image.height_px - kBorder};
   if (inside.x1 <= inside.x0 || inside.y1 <= inside.y0) return;
-  scan(image, pyramid.scale(l), mask, inside, options.fast_threshold, &level.corners);
+  scan(pyramid, l, mask, inside, options.fast_threshold, &level.corners);
   std::fill(cell_hit.begin(), cell_hit.end(), std::uint8_t{0});
   const int cell = options.cell_px;
   for (const Corner& c : level.corners) {
@@ -159,7 +158,7 @@ void Extractor::Workspace::detect(const Pyramid& pyramid, int l, const ImageView
       const PixelBox box{std::max(first * cell, inside.x0), std::max(row * cell, inside.y0),
                          std::min(last * cell, inside.x1), std::min((row + 1) * cell, inside.y1)};
       if (box.x1 <= box.x0 || box.y1 <= box.y0) continue;
-      scan(image, pyramid.scale(l), mask, box, options.fast_threshold_min, &level.corners);
+      scan(pyramid, l, mask, box, options.fast_threshold_min, &level.corners);
     }
   }
 }
@@ -235,7 +234,7 @@ Extractor::Extractor(int width_px, int height_px, const PyramidOptions& pyramid,
 
 Extractor::~Extractor() = default;
 
-void Extractor::extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out, int most) {
+void Extractor::extract(const Pyramid& pyramid, const ImageMask* mask, FeatureSet* out, int most) {
   Workspace& w = *workspace_;
   w.kernels = &active_kernels();
   out->features.clear();

@@ -28,10 +28,10 @@ class Extractor {
   Extractor(const Extractor&) = delete;
   Extractor& operator=(const Extractor&) = delete;
 
-  // Corners of all levels into *out, ordered by level, then row-major by cell. `mask` (same size as level 0,
-  // may be empty): pixels with 0 give no corner. Features are spread over the image: no region may take the
-  // quota of another. At most `most` features, where that is less than the options say.
-  void extract(const Pyramid& pyramid, const ImageView& mask, FeatureSet* out, int most = kAllFeatures);
+  // Corners of all levels into *out, ordered by level, then row-major by cell. `mask` (of level 0's size;
+  // null: none): no corner whose descriptor depends on a masked pixel. Features are spread over the image: no
+  // region may take the quota of another. At most `most` features, where that is less than the options say.
+  void extract(const Pyramid& pyramid, const ImageMask* mask, FeatureSet* out, int most = kAllFeatures);
 
  private:
   struct Workspace;

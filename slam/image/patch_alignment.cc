@@ -111,6 +111,9 @@ void smooth_weights(float t, float out[5]) {
   out[4] = kBlurSide * w[2];
 }
 
+// Pixels to either side of its centre that a window reads: half its side, the rounding, the spline and blur.
+constexpr double kWindowSupport = 6.0;
+
 // Sums of the image around (x, y), at the offsets of the template. False if it leaves the image.
 bool sample_window(const Kernels& kernels, const ImageView& image, float x, float y,
                    const PatchTemplate& with, WindowSums* out) {
@@ -183,6 +186,13 @@ float largest_eigenvalue(const Eigen::Matrix2f& m) {
   return mean + std::sqrt(half * half + m(0, 1) * m(0, 1));
 }
 
+// How `patch` is read for this image: the level of about its resolution, and the warp from that level's
+// pixels to the patch's. False where the two differ too much in resolution.
+struct Reading {
+  int level = 0;
+  Eigen::Matrix2f B;  // an offset in pixels of the level -> one in pixels of the patch
+};
+
 int best_level(const Pyramid& pyramid, float scale) {
   int best = 0;
   for (int l = 1; l < pyramid.levels(); ++l) {
@@ -190,6 +200,54 @@ int best_level(const Pyramid& pyramid, float scale) {
     if (pyramid.scale(l) * pyramid.scale(l - 1) < scale * scale) best = l;
   }
   return best;
+}
+
+bool read_patch(const Pyramid& pyramid, const Patch& patch, const Eigen::Matrix2f& A_target_host,
+                Reading* out) {
+  const float determinant = A_target_host.determinant();
+  if (patch.level >= pyramid.levels() || !(determinant > 1e-4F)) return false;
+  const float host_scale = pyramid.scale(patch.level);
+  out->level = best_level(pyramid, host_scale * std::sqrt(determinant));
+  out->B = A_target_host.inverse() * (pyramid.scale(out->level) / host_scale);
+  const float area = out->B.determinant();
+  return area < kMaxScale * kMaxScale && area * kMaxScale * kMaxScale > 1;
+}
+
+// A template in whole numbers, for sums without rounding.
+struct CoarseTemplate {
+  alignas(16) std::int16_t value[kCount];
+  float norm = 0;
+
+  explicit CoarseTemplate(const Normalised& from) {
+    // Unit norm over 64 pixels: the largest value is below 1. Sums stay below 2^31.
+    constexpr float kUnit = 4096.0F;
+    std::int32_t squares = 0;
+    for (int i = 0; i < kCount; ++i) {
+      value[i] = static_cast<std::int16_t>(std::lround(kUnit * from.unit.value[i]));
+      squares += value[i] * value[i];
+    }
+    norm = std::sqrt(static_cast<float>(squares));
+  }
+};
+
+// -1..1, of the 8x8 pixels from `corner` on.
+float correlation(const std::uint8_t* corner, int stride_bytes, const CoarseTemplate& with) {
+  std::int32_t along = 0, sum = 0, squares = 0, bias = 0;
+  for (int y = 0; y < kSide; ++y, corner += stride_bytes) {
+    for (int x = 0; x < kSide; ++x) {
+      const std::int16_t v = corner[x];
+      const std::int16_t t = with.value[y * kSide + x];
+      along += v * t;
+      squares += v * v;
+      sum += v;
+      bias += t;
+    }
+  }
+  // The template's mean is zero except for rounding.
+  const float mean = static_cast<float>(sum) / kCount;
+  const float energy = static_cast<float>(squares) - static_cast<float>(sum) * mean;
+  if (!(energy > kMinNoise * kMinNoise * kCount)) return -1.0F;
+  return (static_cast<float>(along) - static_cast<float>(bias) * mean) / (with.norm * std::sqrt(energy));
 }
 
 }  // namespace
@@ -203,6 +261,8 @@ bool PyramidImage::extract_patch(const FeatureSet& set, std::size_t index, Patch
   const int y0 = nearest_pixel((f.v_px + 0.5F) / scale - 0.5F) - Patch::kCentre;
   if (x0 < 0 || y0 < 0 || x0 + Patch::kSize > image.width_px || y0 + Patch::kSize > image.height_px)
     return false;
+  if (mask_ != nullptr && mask_->touches({f.u_px, f.v_px}, pyramid_->support_px(f.level, Patch::kCentre)))
+    return false;
   for (int y = 0; y < Patch::kSize; ++y) {
     std::copy_n(image.data + static_cast<std::ptrdiff_t>(y0 + y) * image.stride_bytes + x0, Patch::kSize,
                 patch->pixels.data() + y * Patch::kSize);
@@ -214,20 +274,17 @@ bool PyramidImage::extract_patch(const FeatureSet& set, std::size_t index, Patch
 Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target_host,
                               const Eigen::Vector2f& predicted_px, float max_shift_px) const {
   Alignment result;
-  const float determinant = A_target_host.determinant();
-  if (host.level >= pyramid_->levels() || !(determinant > 1e-4F)) return result;
-  const float host_scale = pyramid_->scale(host.level);
-  const int level = best_level(*pyramid_, host_scale * std::sqrt(determinant));
-  const float scale = pyramid_->scale(level);
-  const Eigen::Matrix2f B = A_target_host.inverse() * (scale / host_scale);
-  const float area = B.determinant();
-  if (!(area < kMaxScale * kMaxScale && area * kMaxScale * kMaxScale > 1)) return result;
+  Reading reading;
+  if (!read_patch(*pyramid_, host, A_target_host, &reading)) return result;
+  const float scale = pyramid_->scale(reading.level);
 
   const Kernels& kernels = active_kernels();
   Normalised host_template;
-  if (!warp_template(kernels, host, B, &host_template.unit) || !normalise(&host_template)) return result;
+  if (!warp_template(kernels, host, reading.B, &host_template.unit) || !normalise(&host_template))
+    return result;
 
-  const ImageView image = pyramid_->level(level);
+  const ImageView image = pyramid_->level(reading.level);
+  const double support_px = pyramid_->support_px(reading.level, kWindowSupport);
   const Eigen::Vector2f half(0.5F, 0.5F);
   const Eigen::Vector2f start = (predicted_px + half) / scale - half;
   Eigen::Vector2f p = start;
@@ -236,6 +293,8 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   for (int iteration = 0; iteration < kMaxIterations && !converged; ++iteration) {
     // The template's parts have zero mean, so that the window's own mean drops out of the products.
     WindowSums product;
+    if (mask_ != nullptr && mask_->touches(((p + half) * scale - half).cast<double>(), support_px))
+      return result;
     if (!sample_window(kernels, image, p.x(), p.y(), host_template.unit, &product)) return result;
     const float energy = product.square - product.value * product.value / kCount;
     gain = product.along / host_template.norm;
@@ -258,6 +317,28 @@ Alignment PyramidImage::align(const Patch& host, const Eigen::Matrix2f& A_target
   result.sigma_px = sigma * scale;
   result.ok = converged && result.zncc >= kMinZncc && largest_eigenvalue(covariance) <= kMaxSigma * kMaxSigma;
   return result;
+}
+
+bool PyramidImage::correlate(const Patch& host, const Eigen::Matrix2f& A_target_host,
+                             std::span<const Eigen::Vector2f> pixels, std::span<float> zncc) const {
+  Reading reading;
+  Normalised host_template;
+  if (!read_patch(*pyramid_, host, A_target_host, &reading) ||
+      !warp_template(active_kernels(), host, reading.B, &host_template.unit) || !normalise(&host_template))
+    return false;
+  const CoarseTemplate coarse(host_template);
+  const ImageView image = pyramid_->level(reading.level);
+  const float scale = pyramid_->scale(reading.level);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    // The template's first pixel lies kFirst, half a pixel and three, before the corner.
+    const int x0 = nearest_pixel((pixels[i].x() + 0.5F) / scale - 0.5F + kFirst);
+    const int y0 = nearest_pixel((pixels[i].y() + 0.5F) / scale - 0.5F + kFirst);
+    const bool inside = x0 >= 0 && y0 >= 0 && x0 + kSide <= image.width_px && y0 + kSide <= image.height_px;
+    zncc[i] = inside ? correlation(image.data + static_cast<std::ptrdiff_t>(y0) * image.stride_bytes + x0,
+                                   image.stride_bytes, coarse)
+                     : -1.0F;
+  }
+  return true;
 }
 
 }  // namespace farpoint::slam

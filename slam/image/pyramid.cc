@@ -83,6 +83,7 @@ std::vector<RowTap> make_row_taps(int source_height, int height, double factor) 
 struct Level {
   int width = 0, height = 0, stride = 0;
   float scale = 1;
+  double spread_px = 0;  // how far the level-0 pixels lie that one of its pixels is made of
   std::uint8_t* pixels = nullptr;
   std::vector<ResampleBlock> blocks;  // from the level below
   std::vector<RowTap> rows;
@@ -115,6 +116,8 @@ Pyramid::Pyramid(int width_px, int height_px, const PyramidOptions& options)
     bytes += static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(level.height);
     if (l == 0) continue;
     const Level& below = s.levels[l - 1];
+    // The taps: one pixel to either side of the nearest, which is up to half a pixel away.
+    level.spread_px = below.spread_px + 1.5 * static_cast<double>(below.scale);
     level.blocks = make_blocks(below.width, level.width, options.scale_factor);
     level.rows = make_row_taps(below.height, level.height, options.scale_factor);
   }
@@ -174,6 +177,11 @@ ImageView Pyramid::level(int l) const {
 
 float Pyramid::scale(int l) const {
   return storage_->levels[static_cast<std::size_t>(l)].scale;
+}
+
+double Pyramid::support_px(int l, double radius_px) const {
+  const Level& level = storage_->levels[static_cast<std::size_t>(l)];
+  return radius_px * static_cast<double>(level.scale) + level.spread_px;
 }
 
 std::size_t Pyramid::bytes() const {

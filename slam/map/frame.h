@@ -21,6 +21,7 @@ struct Frame {
   std::uint64_t number = 0;  // counts processed frames, from 0
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
+  bool repeats = false;  // each image is the one before, bit for bit: it has no features
   PerCamera<FrameView> views;
 
   // Some camera's pixels are there.

@@ -28,6 +28,9 @@ struct KeyframeView {
   std::shared_ptr<const FrameImage> image;  // pixels for alignment; null: thinned, or no image
 
   [[nodiscard]] bool has_pixels() const { return image != nullptr; }
+  // It has corners of its own, by which landmarks can be found. Else its features are places where a further
+  // camera shows those of the first.
+  [[nodiscard]] bool has_corners() const { return !set.descriptors.empty(); }
 };
 
 struct Keyframe {

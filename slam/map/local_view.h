@@ -9,6 +9,7 @@
 
 #include "slam/config.h"
 #include "slam/map/landmark.h"
+#include "slam/map/map_judgement.h"
 
 namespace farpoint::slam {
 
@@ -48,7 +49,7 @@ struct LocalView {
   double reference_nearness = 0;  // theirs in sum
   int map_keyframes = 0;          // alive in this map
   double median_depth = 1.0;      // of the reference keyframe's landmarks, map units
-  bool settled = false;           // the map's scale holds (mapping/settling)
+  MapJudgement judgement;
 
   // Keyframe::S_world_body of the reference.
   [[nodiscard]] Sim3 S_world_reference() const {

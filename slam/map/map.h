@@ -91,6 +91,10 @@ class Map {
   // Sets a refined calibration. Computes the bearings of landmarks, and of keyframes that keep their pixels,
   // anew; poses and inverse depths stay.
   void set_camera(int index, const Camera& camera);
+  // Sets a refined place of a camera on the body. Precondition: the camera is no landmark's anchor.
+  void place_camera(int index, const SE3& T_body_camera) {
+    rig_.cameras[static_cast<std::size_t>(index)].T_body_camera = T_body_camera;
+  }
   // Removes everything of one map.
   void discard_map(std::int32_t map_id);
   // Moves a keyframe by a similarity of world coordinates, with the landmarks that it hosts: pose, anchors,

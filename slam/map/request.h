@@ -44,7 +44,8 @@ struct InitialPoint {
   double inverse_depth = 0;  // along the bearing in the first camera, 1 / baseline
 };
 
-// Two frames of known relative motion, by the images of one camera.
+// Two frames of known relative motion, by the images of one camera. Or one frame, `second` null, that two
+// cameras of the rig show: they are its own pair.
 struct InitialPair {
   std::shared_ptr<Frame> first, second;
   SE3 T_first_second;  // bodies, unit baseline

@@ -20,6 +20,12 @@ namespace farpoint::slam {
 
 using CalibrationDelta = Eigen::Vector4d;
 
+// d(pixel)/d(delta) at a point, camera axes, that projects to `pixel`.
+using CameraDerivative = Eigen::Matrix<double, 2, 4>;
+[[nodiscard]] CameraDerivative camera_derivative(const Camera& camera, const Eigen::Vector3d& point_c,
+                                                 const Eigen::Vector2d& pixel);
+// Largest move of a ray's pixel over the image's edge between two calibrations of one camera.
+[[nodiscard]] double image_change_px(const Camera& from, const Camera& to);
 // The given camera changed by delta.
 [[nodiscard]] Camera refined_camera(const Camera& given, const CalibrationDelta& delta);
 
@@ -59,7 +65,6 @@ class Calibrator {
   };
   [[nodiscard]] Quadratic window_information(const BundleProblem& problem,
                                              const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const;
-  [[nodiscard]] double image_change_px(const Camera& next) const;
 
   CalibrationConfig config_;
   Camera given_;

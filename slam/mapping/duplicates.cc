@@ -75,7 +75,7 @@ void Duplicates::search_into(KeyframeHandle handle, const std::vector<LandmarkHa
 void Duplicates::search_into_view(Observer observer, const std::vector<LandmarkHandle>& landmarks) {
   const Keyframe& keyframe = map_.keyframes()[observer.keyframe];
   const KeyframeView& view = keyframe.views[observer.camera];
-  if (!view.has_pixels()) return;
+  if (!view.has_pixels() || !view.has_corners()) return;
   const Predictor predictor(map_.camera(observer.camera).camera,
                             map_.T_world_camera(keyframe, observer.camera).inverse());
   anchors_.forget();

@@ -29,6 +29,15 @@ KeyframeView KeyframeMaker::copy(const FrameView& view, const Camera& camera) {
   return out;
 }
 
+KeyframeView KeyframeMaker::room_beside(const FrameView& first, const FrameView& further) {
+  KeyframeView out = map_.preallocated_view();
+  out.set.features = first.set.features;
+  out.set.descriptors.clear();
+  out.bearings.clear();
+  out.image = further.image;
+  return out;
+}
+
 KeyframeHandle KeyframeMaker::make(const Frame& frame, const SE3& T_world_body, std::int32_t map_id) {
   if (map_.keyframes().full()) return {};
   Keyframe k = map_.new_keyframe();
@@ -36,8 +45,13 @@ KeyframeHandle KeyframeMaker::make(const Frame& frame, const SE3& T_world_body, 
   k.utime = frame.utime;
   k.frame_number = frame.number;
   k.T_world_body = T_world_body;
-  for (int c = 0; c < frame.views.size(); ++c)
-    if (!frame.views[c].set.features.empty()) k.views[c] = copy(frame.views[c], map_.camera(c).camera);
+  for (int c = 0; c < frame.views.size(); ++c) {
+    const FrameView& view = frame.views[c];
+    if (!view.set.features.empty())
+      k.views[c] = copy(view, map_.camera(c).camera);
+    else if (c > 0 && view.image)
+      k.views[c] = room_beside(frame.views[0], view);
+  }
   const KeyframeHandle handle = map_.add_keyframe(std::move(k));
   ++counts_.keyframes_made;
   newest_ = handle;

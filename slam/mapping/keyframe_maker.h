@@ -15,8 +15,9 @@ class KeyframeMaker {
   // Both must outlive this.
   KeyframeMaker(Map* map, MappingCounts* counts) : map_(*map), counts_(*counts) {}
 
-  // Copies the frame, every camera's view that has features, into the map: it becomes the newest keyframe.
-  // Null where the map is full.
+  // Copies the frame into the map: it becomes the newest keyframe. A further camera's view that has pixels
+  // alone gets room for as many features as the first camera has: feature i is where it shows feature i of
+  // the first. Null where the map is full.
   KeyframeHandle make(const Frame& frame, const SE3& T_world_body, std::int32_t map_id);
 
   // The keyframe made last; the handle ends when the map removes it.
@@ -26,6 +27,7 @@ class KeyframeMaker {
 
  private:
   [[nodiscard]] KeyframeView copy(const FrameView& view, const Camera& camera);
+  [[nodiscard]] KeyframeView room_beside(const FrameView& first, const FrameView& further);
 
   Map& map_;
   MappingCounts& counts_;

@@ -42,7 +42,7 @@ constexpr int kFoundOneIn = 3;
 // Range of the size in the witness against the host's within which the patch can be found.
 constexpr float kMinWitnessScale = 0.55F, kMaxWitnessScale = 1.8F;
 constexpr float kWitnessSearch_level_px = 2.0F;
-constexpr double kWitnessBorder_px = 12.0;  // from the image's edge: half a patch is in it
+constexpr double kWitnessBorder_px = 12.0;  // from the image's edge and its mask: half a patch is in it
 // Largest ratio of a match's distance to the second best on the line: every depth on it is as likely.
 constexpr float kSecondBest = 0.85F;
 
@@ -71,6 +71,7 @@ void LandmarkMaker::process(KeyframeHandle newer, const std::vector<KeyframeHand
 
 void LandmarkMaker::pair_views(Observer newer, Observer older) {
   if (!view_of(older).has_pixels() || !view_of(newer).has_pixels()) return;
+  if (!view_of(older).has_corners() || !view_of(newer).has_corners()) return;
   const PairGeometry geometry = relate(newer, older);
   if (!geometry.valid) return;
   find_pairs(newer, older, geometry, &pairs_);
@@ -347,6 +348,7 @@ std::optional<bool> LandmarkMaker::shows(const Keyframe& witness, const Landmark
     if (!predict(input, map_.camera(c).camera, map_.T_world_camera(witness, c).inverse(), kWitnessBorder_px,
                  &p))
       continue;
+    if (map_.camera(c).is_masked(p.pixel, kWitnessBorder_px)) continue;
     if (p.scale_change < kMinWitnessScale || p.scale_change > kMaxWitnessScale) continue;
     const float search_px =
         kWitnessSearch_level_px * std::max(1.0F, level_scale_[l.host_level] * p.scale_change);

@@ -16,8 +16,9 @@ constexpr int kFirstIterations = 20;
 // The camera whose calibration is refined.
 constexpr int kRefinedCamera = 0;
 
-MapOptions map_options(const EstimatorConfig& config) {
+MapOptions map_options(const EstimatorConfig& config, const Rig& rig) {
   MapOptions options;
+  options.views_per_keyframe = static_cast<int>(rig.cameras.size());
   options.wide_parallax_rad = config.landmarks.promote_parallax_rad;
   options.features = static_cast<std::size_t>(config.extractor.features);
   // Twice the longest list in use: keyframes that are removed leave gaps until the next update.
@@ -30,16 +31,18 @@ MapOptions map_options(const EstimatorConfig& config) {
 
 Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
     : config_(config),
-      map_(config.capacity, rig, map_options(config)),
+      map_(config.capacity, rig, map_options(config, rig)),
       keyframe_maker_(&map_, &counts_),
       duplicates_(config_, &map_, &counts_),
       landmark_maker_(config_, &map_, &counts_),
+      rig_depth_(config_, &map_, &landmark_maker_, &counts_),
       probation_(&map_, &counts_),
       window_(config_, &map_, &counts_),
       solver_(static_cast<std::size_t>(config.mapping.window_landmarks),
               static_cast<std::size_t>(config.mapping.window_sightings)),
       calibrator_(config.calibration, rig.cameras[kRefinedCamera].camera, kRefinedCamera),
       view_builder_(config_, &map_) {
+  if (rig.cameras.size() > 1) rig_calibrator_.emplace(config.calibration, rig);
   if (config.mapping.solver == "ceres" && config.mapping.solve_instead == nullptr)
     throw std::invalid_argument("mapping.solver: ceres: no solver was given with it");
 }
@@ -50,6 +53,7 @@ Mapper::Mapper(const EstimatorConfig& config, const Rig& rig)
 std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std::int32_t map_id) {
   settling_.start_map();
   probation_.clear();
+  if (pair.second == nullptr) return start_metric_map(*pair.first, map_id);
   const KeyframeHandle first = keyframe_maker_.make(*pair.first, SE3{}, map_id);
   const KeyframeHandle second = keyframe_maker_.make(*pair.second, pair.T_first_second, map_id);
   if (first.is_null() || second.is_null()) {
@@ -65,6 +69,28 @@ std::shared_ptr<const LocalView> Mapper::start_map(const InitialPair& pair, std:
   }
   note_creation_sigmas(map_id);
   return make_view(second);
+}
+
+std::shared_ptr<const LocalView> Mapper::start_metric_map(const Frame& frame, std::int32_t map_id) {
+  const KeyframeHandle first = keyframe_maker_.make(frame, SE3{}, map_id);
+  if (first.is_null()) return nullptr;
+  rig_depth_.measure(first);
+  make_full(map_id);
+  if (count_landmarks(map_id) < static_cast<std::size_t>(config_.initialisation.min_landmarks) / 2) {
+    map_.discard_map(map_id);
+    return nullptr;
+  }
+  note_creation_sigmas(map_id);
+  map_.update_covisibility(first);
+  settling_.start_metric_map();
+  return make_view(first);
+}
+
+// A map's first points need no probation against keyframes that it does not have.
+void Mapper::make_full(std::int32_t map_id) {
+  map_.landmarks().for_each([&](LandmarkHandle, Landmark& l) {
+    if (l.map_id == map_id && l.state == LandmarkState::kWeak) l.state = LandmarkState::kFull;
+  });
 }
 
 void Mapper::add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second) {
@@ -93,8 +119,9 @@ bool Mapper::add_initial_landmark(const InitialPoint& point, Observer first, Obs
 
 std::size_t Mapper::count_landmarks(std::int32_t map_id) const {
   std::size_t count = 0;
-  map_.landmarks().for_each(
-      [&](LandmarkHandle, const Landmark& l) { count += l.map_id == map_id ? 1U : 0U; });
+  map_.landmarks().for_each([&](LandmarkHandle, const Landmark& l) {
+    count += l.map_id == map_id && l.state != LandmarkState::kBearing ? 1U : 0U;
+  });
   return count;
 }
 
@@ -137,8 +164,13 @@ void Mapper::attach_sightings(KeyframeHandle keyframe, const KeyframeRequest& re
   for (const Sighting& s : request.sightings) {
     if (!map_.landmarks().contains(s.landmark)) continue;
     const auto camera = static_cast<std::uint8_t>(s.camera);
-    if (map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px, 0, camera}))
-      landmark_maker_.reconsider(s.landmark);
+    if (!map_.add_observation(s.landmark, {keyframe, s.feature, s.pixel, s.sigma_px, 0, camera})) continue;
+    KeyframeView& view = map_.keyframes()[keyframe].views[camera];
+    if (!view.has_corners()) {
+      view.set.features[static_cast<std::size_t>(s.feature)].u_px = s.pixel.x();
+      view.set.features[static_cast<std::size_t>(s.feature)].v_px = s.pixel.y();
+    }
+    landmark_maker_.reconsider(s.landmark);
   }
   for (const SightingCount& c : request.counts)
     if (Landmark* l = map_.landmarks().get(c.landmark)) l->visible += c.visible, l->found += c.found;
@@ -148,6 +180,7 @@ void Mapper::make_landmarks(KeyframeHandle keyframe) {
   const std::uint64_t made = counts_.landmarks_made;
   landmark_maker_.process(
       keyframe, neighbours_of(map_, keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
+  if (settling_.metric()) rig_depth_.measure(keyframe);
   landmark_maker_.evict_bearings(keyframe);
   if (counts_.landmarks_made > made) probation_.admit_made_at(keyframe);
 }
@@ -169,7 +202,12 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   map_.update_covisibility(newest);
   const bool optimised = optimise(newest, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
-  if (optimised && config_.calibration.refine && settling_.fits_well()) refine_calibration();
+  if (optimised && config_.calibration.refine) {
+    if (settling_.metric())
+      refine_rig();
+    else if (settling_.fits_well())
+      refine_calibration();
+  }
   const StageSpan span(listener_, Stage::kCulling);
   forget(newest);
   map_.update_covisibility(newest);
@@ -179,7 +217,7 @@ std::shared_ptr<const LocalView> Mapper::refine() {
 
 bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   const StageSpan span(listener_, Stage::kLocalBa);
-  window_.build(centre);
+  window_.build(centre, settling_.further_sigma_factor());
   BundleProblem& problem = window_.problem();
   if (problem.points.empty()) return false;
   BundleOptions options;
@@ -192,7 +230,8 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   ++counts_.local_ba;
   if (!summary.usable) return false;
   const Soundness soundness = soundness_of(problem);
-  settling_.note_adjustment(soundness, window_.take_back(), calibrator_.contradicts_given());
+  const std::int64_t utime = map_.keyframes()[centre].utime;
+  settling_.note_adjustment(soundness, window_.take_back(), counts_.calibration_contradicted, utime);
   return true;
 }
 
@@ -204,6 +243,20 @@ void Mapper::refine_calibration() {
   if (calibrator_.update(window_.problem(), d_bearing))
     map_.set_camera(calibrator_.camera_index(), calibrator_.camera());
   counts_.calibration_contradicted = calibrator_.contradicts_given();
+}
+
+void Mapper::refine_rig() {
+  const StageSpan span(listener_, Stage::kCalibration);
+  const auto d_bearing = window_.bearing_derivatives(kRefinedCamera);
+  const bool moved = rig_calibrator_->update(window_.problem(), d_bearing);
+  counts_.calibration_contradicted = rig_calibrator_->contradicts_given();
+  if (!moved) return;
+  const Rig& rig = rig_calibrator_->rig();
+  for (int c = 0; c < map_.camera_count(); ++c) {
+    const RigCamera& camera = rig.cameras[static_cast<std::size_t>(c)];
+    map_.set_camera(c, camera.camera);
+    map_.place_camera(c, camera.T_body_camera);
+  }
 }
 
 void Mapper::forget(KeyframeHandle newest) {

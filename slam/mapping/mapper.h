@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
@@ -18,6 +19,8 @@
 #include "slam/mapping/keyframe_maker.h"
 #include "slam/mapping/landmark_maker.h"
 #include "slam/mapping/probation.h"
+#include "slam/mapping/rig_calibrator.h"
+#include "slam/mapping/rig_depth.h"
 #include "slam/mapping/settling.h"
 #include "slam/mapping/view_builder.h"
 #include "slam/mapping/window.h"
@@ -37,6 +40,7 @@ class Mapper {
   void listen(StageListener* listener) { listener_ = listener; }
 
   // Starts a new map from two views. Null where too few points survive adjustment; the map is then discarded.
+  // From one frame that two cameras show, where the pair has no second: such a map is metric.
   std::shared_ptr<const LocalView> start_map(const InitialPair& pair, std::int32_t map_id);
 
   // Inserts a keyframe and returns the quick view: new landmarks, poses not yet optimised. Null where the
@@ -60,6 +64,8 @@ class Mapper {
   [[nodiscard]] std::size_t adjustment_bytes() const { return window_.bytes() + solver_.bytes(); }
 
  private:
+  std::shared_ptr<const LocalView> start_metric_map(const Frame& frame, std::int32_t map_id);
+  void make_full(std::int32_t map_id);
   void add_initial_landmarks(const InitialPair& pair, KeyframeHandle first, KeyframeHandle second);
   [[nodiscard]] bool add_initial_landmark(const InitialPoint& point, Observer first, Observer second);
   [[nodiscard]] std::size_t count_landmarks(std::int32_t map_id) const;
@@ -70,9 +76,10 @@ class Mapper {
   // Local bundle adjustment. False where nothing was optimised or the solution is unusable.
   bool optimise(KeyframeHandle centre, int iterations);
   void refine_calibration();
+  void refine_rig();
   void forget(KeyframeHandle newest);
   [[nodiscard]] std::shared_ptr<const LocalView> make_view(KeyframeHandle reference) {
-    return view_builder_.build(reference, settling_.settled());
+    return view_builder_.build(reference, settling_.judgement());
   }
 
   const EstimatorConfig config_;
@@ -81,11 +88,13 @@ class Mapper {
   KeyframeMaker keyframe_maker_;
   Duplicates duplicates_;
   LandmarkMaker landmark_maker_;
+  RigDepth rig_depth_;
   Probation probation_;
   Window window_;
   SchurSolver solver_;
   Settling settling_;
   Calibrator calibrator_;
+  std::optional<RigCalibrator> rig_calibrator_;  // of two cameras
   ViewBuilder view_builder_;
   StageListener* listener_ = nullptr;
 };

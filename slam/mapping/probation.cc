@@ -7,12 +7,14 @@ namespace farpoint::slam {
 
 void Probation::admit_made_at(KeyframeHandle keyframe) {
   const Keyframe& k = map_.keyframes()[keyframe];
-  for (int c = 0; c < k.views.size(); ++c)
+  for (int c = 0; c < k.views.size(); ++c) {
+    if (!k.views[c].has_corners()) continue;  // the first camera's landmarks once more
     for (const LandmarkHandle& h : k.views[c].landmarks) {
       const Landmark* l = map_.landmarks().get(h);
       if (l != nullptr && l->state != LandmarkState::kBearing && l->created_keyframe == k.id)
         landmarks_.push_back(h);
     }
+  }
 }
 
 bool Probation::fails(const Landmark& landmark, std::uint64_t age_keyframes) {

@@ -7,27 +7,42 @@
 namespace farpoint::slam {
 
 void Settling::start_map() {
-  settled_ = false;
-  steady_run_ = 0;
+  const double sound_s = judgement_.sound ? judgement_.sound_s : 0.0;
+  judgement_ = {};
+  judgement_.sound_s = sound_s;
   soundness_ = {};
+  further_.start_map();
+  steady_run_ = 0;
+  has_adjustment_ = false;
+}
+
+void Settling::start_metric_map() {
+  judgement_.metric = judgement_.steady = true;
+  steady_run_ = kSteadyRun;
 }
 
 void Settling::note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
-                               bool calibration_contradicted) {
+                               bool calibration_contradicted, std::int64_t utime) {
   soundness_ = soundness;
+  further_.note_adjustment(soundness, utime);
+  judgement_.further_sigma_factor = further_.sigma_factor();
   if (!scale_change) return;
-  if (!soundness_.holds(settled_) || calibration_contradicted) {
-    // A rolling shutter under fast rotation, a moving scene or a wrong calibration bends the map to fit: its
-    // poses are wrong, however many inliers they have.
-    settled_ = false;
-    steady_run_ = 0;
-    sound_run_ = 0;
-    return;
-  }
-  const bool steady = std::fabs(std::log(*scale_change)) < kSteadyChange;
-  sound_run_ = std::min(sound_run_ + 1, kSoundRun);
+  MapJudgement& j = judgement_;
+  const double gap_s =
+      has_adjustment_ && j.sound ? 1e-6 * static_cast<double>(utime - j.adjusted_utime) : 0.0;
+  has_adjustment_ = true;
+  // A rolling shutter under fast rotation, a moving scene or a wrong calibration bends the map to fit: its
+  // poses are wrong, however many inliers they have.
+  j.unsound = soundness.refusal(j.steady && j.sound);
+  j.sound = j.unsound.reason == Reason::kNone && !calibration_contradicted;
+  j.sound_s =
+      j.sound ? std::min(j.sound_s + std::clamp(gap_s, 0.0, kLongestGap_s), MapJudgement::kSoundTime_s) : 0.0;
+  j.calibration_contradicted = calibration_contradicted;
+  j.adjusted_utime = utime;
+  j.scale_change = *scale_change;
+  const bool steady = std::fabs(std::log(*scale_change)) < MapJudgement::kSteadyChange;
   steady_run_ = steady ? steady_run_ + 1 : 0;
-  if (steady_run_ >= kSteadyRun && sound_run_ == kSoundRun) settled_ = true;
+  if (steady_run_ >= kSteadyRun) j.steady = true;
 }
 
 }  // namespace farpoint::slam

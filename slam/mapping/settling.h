@@ -2,8 +2,11 @@
 // Whether a map can be used as a measure: its unit is steady, and its adjustments are sound.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
+#include "slam/map/map_judgement.h"
+#include "slam/mapping/further_trust.h"
 #include "slam/mapping/soundness.h"
 
 namespace farpoint::slam {
@@ -12,32 +15,38 @@ namespace farpoint::slam {
 // bundle adjustments when the unit holds.
 class Settling {
  public:
-  // Adjustments in a row that must each change the unit by less than kSteadyChange.
+  // Adjustments in a row that must each change the unit by less than MapJudgement::kSteadyChange.
   static constexpr int kSteadyRun = 3;
-  static constexpr double kSteadyChange = 0.02;
-  // Sound adjustments in a row that must follow an unsound one, also across maps: what bends one map bends
-  // the next.
-  static constexpr int kSoundRun = 10;
+  // Longest time that one adjustment vouches for, up to the next.
+  static constexpr double kLongestGap_s = 0.5;
 
-  // A new map is unsettled. The run of sound adjustments is kept.
+  // A new map is unsteady. The time of sound adjustments goes on: what bends one map bends the next.
   void start_map();
+  // The new map's unit is given: it holds from the start, unless an unsound adjustment came before.
+  void start_metric_map();
 
-  // Takes in one adjustment. `scale_change`: median factor of the inverse depths; nothing is judged without
-  // it. An unsound adjustment or a contradicted calibration unsettles at once.
+  // Takes in one adjustment, whose newest keyframe is of `utime`. `scale_change`: median factor of the
+  // inverse depths; nothing is judged without it. An unsound adjustment or a contradicted calibration makes
+  // the map unsound at once, for MapJudgement::kSoundTime_s.
   void note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
-                       bool calibration_contradicted);
+                       bool calibration_contradicted, std::int64_t utime);
 
-  [[nodiscard]] bool settled() const { return settled_; }
+  // Of the further cameras' sigmas.
+  [[nodiscard]] double further_sigma_factor() const { return judgement_.further_sigma_factor; }
+  [[nodiscard]] const MapJudgement& judgement() const { return judgement_; }
+  // Whether map units are metres.
+  [[nodiscard]] bool metric() const { return judgement_.metric; }
   // Of the last adjustment of this map; zeros before the first.
   [[nodiscard]] const Soundness& soundness() const { return soundness_; }
   // Whether the map is good enough to refine the calibration from.
-  [[nodiscard]] bool fits_well() const { return soundness_.fits_well(settled_); }
+  [[nodiscard]] bool fits_well() const { return soundness_.fits_well(judgement_.steady && judgement_.sound); }
 
  private:
   Soundness soundness_;
+  FurtherTrust further_;
+  MapJudgement judgement_;
   int steady_run_ = 0;
-  int sound_run_ = kSoundRun;  // at most kSoundRun
-  bool settled_ = false;
+  bool has_adjustment_ = false;  // of this map
 };
 
 }  // namespace farpoint::slam

@@ -4,27 +4,37 @@
 // a scene that moves.
 #pragma once
 
+#include "slam/map/refusal.h"
 #include "slam/solver/bundle_problem.h"
 
 namespace farpoint::slam {
 
 struct Soundness {
-  // Mean of the measurements' chi2 (two degrees of freedom; each cut off at kLargestChi2), each with the say
-  // that its point's weight gives it in the adjustment. It tells how large the residuals are, and with that
-  // also how rough the scene is and how coarse its pixels.
+  // Noise, excess and field are those of the first camera, which holds the map's shape.
+  //
+  // Mean of the measurements' chi2 (two degrees of freedom; each cut off at kLargestChi2), each with the
+  // weight of its point in the adjustment. Tells how large the residuals are in claimed sigmas.
   double mean_chi2 = 0;
-  // How much more of its residuals an affine field over the image explains than it would of independent ones
-  // (an F statistic), mean over the free keyframes. About 1 (less by what the adjustment has fitted itself)
-  // where nothing bends the map, however large the residuals are: errors of patches know nothing of each
-  // other, those of a camera are a field. 0 where no keyframe has enough measurements to tell.
-  double coherence = 0;
-  // How large the field is, in terms of chi2.
-  [[nodiscard]] double pattern() const { return mean_chi2 * coherence; }
+  // The measurements' noise as the residuals show it, in claimed sigmas and in pixels: of inliers, beside the
+  // field below. 0 without measurements.
+  double noise_sigmas = 0, noise_px = 0;
+  // Chi2 a degree of freedom, by that noise: 1 for errors of a normal distribution, more where the scene
+  // moves or matches are wrong.
+  double excess = 0;
+  // RMS in pixels of an affine field over the first camera's image, in the residuals of the free keyframes;
+  // what independent errors give by chance is taken off. Errors of patches are independent of each other,
+  // those of a camera are a field. Does not depend on the number of measurements. 0 where no keyframe has
+  // enough of them.
+  double field_px = 0;
+  // The same of further cameras' views, and how many measurements a view has: what those share.
+  double further_field_px = 0, further_measurements = 0;
+  // Claimed, RMS, px.
+  double further_sigma_px = 0;
 
-  // Whether the map's poses can be called valid. What held before may waver.
-  [[nodiscard]] bool holds(bool held_before) const;
-  // Whether the map is good enough to refine the calibration from. How coherent the residuals are does not
-  // matter here: those of a wrong calibration are, and refinement is what finds it out.
+  // Why the map's poses cannot be called valid; no reason where they can. What held before may waver.
+  [[nodiscard]] Refusal refusal(bool held_before) const;
+  // Whether the map is good enough to refine the calibration from. A field does not matter here: a wrong
+  // calibration leaves one, and refinement finds it out.
   [[nodiscard]] bool fits_well(bool held_before) const;
 };
 

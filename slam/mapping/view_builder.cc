@@ -41,10 +41,10 @@ bool ViewBuilder::guides_tracking(const Landmark& landmark) const {
          static_cast<int>(landmark.observations.size()) >= config_.landmarks.bearing_observations;
 }
 
-std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bool settled) {
+std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, const MapJudgement& judgement) {
   const std::shared_ptr<LocalView> view = views_.take();
   if (!view) return view;
-  begin(reference, settled, view.get());
+  begin(reference, judgement, view.get());
   select_keyframes(reference);
   is_taken_.assign(map_.landmarks().capacity(), 0);
   depths_.clear();
@@ -60,7 +60,7 @@ std::shared_ptr<const LocalView> ViewBuilder::build(KeyframeHandle reference, bo
   return view;
 }
 
-void ViewBuilder::begin(KeyframeHandle reference, bool settled, LocalView* view) {
+void ViewBuilder::begin(KeyframeHandle reference, const MapJudgement& judgement, LocalView* view) {
   const Keyframe& centre = map_.keyframes()[reference];
   view->keyframes.clear();
   view->landmarks.clear();
@@ -72,7 +72,7 @@ void ViewBuilder::begin(KeyframeHandle reference, bool settled, LocalView* view)
   view->reference_id = centre.id;
   view->T_world_reference = centre.T_world_body;
   view->reference_scale = centre.scale;
-  view->settled = settled;
+  view->judgement = judgement;
   view->rig = map_.rig();
   view->map_keyframes = 0;
   map_.keyframes().for_each(

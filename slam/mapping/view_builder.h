@@ -31,13 +31,14 @@ class ViewBuilder {
 
   // A view around `reference`, at most capacity.view_landmarks large. Null where all views are in use.
   // Precondition: the keyframe is alive.
-  [[nodiscard]] std::shared_ptr<const LocalView> build(KeyframeHandle reference, bool settled);
+  [[nodiscard]] std::shared_ptr<const LocalView> build(KeyframeHandle reference,
+                                                       const MapJudgement& judgement);
 
   // Memory of all views.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  void begin(KeyframeHandle reference, bool settled, LocalView* view);
+  void begin(KeyframeHandle reference, const MapJudgement& judgement, LocalView* view);
   void select_keyframes(KeyframeHandle reference);
   void add_keyframe(KeyframeHandle keyframe);
   void add_landmarks(KeyframeHandle keyframe, bool is_reference, LocalView* view);

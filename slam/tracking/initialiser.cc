@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "slam/image/descriptor_search.h"
+#include "slam/tracking/constant_velocity.h"
 #include "slam/tracking/work_space.h"
 
 namespace farpoint::slam {
@@ -18,6 +19,20 @@ constexpr int kMinMatches = 80;
 // next to the reference gave, chance matches prevail.
 constexpr double kMinMatchShare = 0.35;
 constexpr double kCornerSigma_px = 1.0;  // corners are not aligned yet
+// A rotation by less is a vehicle that stands and shakes.
+constexpr double kTurn_rad = 0.02;
+// A frame that comes a little early counts as in time.
+constexpr double kEarly_s = 0.001;
+
+// By the motion that most matches agree with; without any there is no share to name.
+Refusal poor_model(const TwoViewResult& motion) {
+  const TwoViewOptions options;
+  const auto agreeing = static_cast<double>(std::max(motion.inliers, motion.essential_inliers));
+  if (agreeing <= 0.0) return {.reason = Reason::kNoCommonMotion};
+  const auto matches = static_cast<double>(motion.matches);
+  return {Reason::kNoCommonMotion, agreeing / matches,
+          std::max(options.min_inlier_share, static_cast<double>(options.min_inliers) / matches)};
+}
 
 }  // namespace
 
@@ -34,13 +49,15 @@ Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig, int came
   reserve_touched(&first_, features);
   reserve_touched(&second_, features);
   reserve_touched(&used_, features);
+  reserve_touched(&parallax_rad_, features);
   two_view_.reserve(features);
 }
 
 std::size_t Initialiser::bytes() const {
   return capacity_bytes(expected_px_) + capacity_bytes(pairs_) + capacity_bytes(pair_.points) +
          capacity_bytes(owner_) + capacity_bytes(found_) + capacity_bytes(owner_distance_) +
-         capacity_bytes(first_) + capacity_bytes(second_) + capacity_bytes(used_) + two_view_.bytes();
+         capacity_bytes(first_) + capacity_bytes(second_) + capacity_bytes(used_) +
+         capacity_bytes(parallax_rad_) + two_view_.bytes();
 }
 
 void Initialiser::remember(std::shared_ptr<Frame> frame) {
@@ -63,12 +80,19 @@ void Initialiser::set_reference(std::shared_ptr<Frame> frame) {
   for (const Feature& f : view_of(*reference_).set.features) expected_px_.emplace_back(f.u_px, f.v_px);
 }
 
-// Only a frame about half way between the reference and now can be the next reference. What is older never
-// can again, and every second frame will do: the other pixels go back to the pool.
-void Initialiser::forget_pixels(std::uint64_t age) {
-  const std::uint64_t half = reference_->number + (age + 1) / 2;
-  for (const std::shared_ptr<Frame>& f : history_)
-    if (f != reference_ && f != history_.back() && (f->number < half || f->number % 2 == 1)) f->drop_pixels();
+// Only a frame about half way between the reference and now can be the next reference. Pixels of older ones
+// go back to the pool, and of those nearer than kCandidateSpacing_s to the candidate before.
+void Initialiser::forget_pixels(std::int64_t half_utime) {
+  std::int64_t last_utime = reference_->utime;
+  for (const std::shared_ptr<Frame>& f : history_) {
+    if (f == reference_ || f == history_.back()) continue;
+    const bool candidate = f->utime >= half_utime && f->has_pixels() &&
+                           seconds_between(last_utime, f->utime) > kCandidateSpacing_s - kEarly_s;
+    if (candidate)
+      last_utime = f->utime;
+    else
+      f->drop_pixels();
+  }
 }
 
 void Initialiser::match(const Frame& frame) {
@@ -134,11 +158,38 @@ bool Initialiser::shows_parallax(const TwoViewResult& motion) const {
                                           static_cast<std::ptrdiff_t>(motion.inliers / 4));
 }
 
+Refusal Initialiser::refusal_of(const TwoViewResult& motion) {
+  switch (motion.status) {
+    case TwoViewStatus::kTooFewMatches:
+      return {Reason::kFewMatches, static_cast<double>(last_matches_), kMinMatches};
+    case TwoViewStatus::kNoParallax: {
+      const double turn_rad = Eigen::AngleAxisd(motion.T_2_1.q).angle();
+      return {turn_rad > kTurn_rad ? Reason::kTurningOnly : Reason::kStanding, turn_rad};
+    }
+    case TwoViewStatus::kAmbiguous:
+      return {.reason = Reason::kAmbiguousStart};
+    case TwoViewStatus::kPoorModel:
+      return poor_model(motion);
+    case TwoViewStatus::kOk:
+      break;
+  }
+  parallax_rad_.clear();
+  for (std::size_t i = 0; i < motion.parallax_rad.size(); ++i)
+    if (motion.inlier[i] != 0) parallax_rad_.push_back(motion.parallax_rad[i]);
+  if (parallax_rad_.empty()) return {.reason = Reason::kAmbiguousStart};
+  const auto quarter = parallax_rad_.begin() + static_cast<std::ptrdiff_t>(3 * parallax_rad_.size() / 4);
+  std::nth_element(parallax_rad_.begin(), quarter, parallax_rad_.end());
+  return {Reason::kLittleParallax, *quarter, config_.initialisation.min_parallax_rad};
+}
+
 bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
   unproject_pairs(*frame);
   const TwoViewResult& r =
       estimate_two_view(first_, second_, kCornerSigma_px / rig_camera_.camera.focal_px(), {}, &two_view_);
-  if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) return false;
+  if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) {
+    refusal_ = refusal_of(r);
+    return false;
+  }
   pair_.first = reference_;
   pair_.second = frame;
   pair_.camera = camera_;
@@ -151,7 +202,10 @@ bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
     if (r.inlier[i] == 0 || r.inverse_depth[i] <= 0.0) continue;
     pair_.points.push_back({used_[i].feature_first, used_[i].feature_second, r.inverse_depth[i]});
   }
-  return static_cast<int>(pair_.points.size()) >= config_.initialisation.min_landmarks;
+  const int points = static_cast<int>(pair_.points.size());
+  refusal_ = {Reason::kFewMatches, static_cast<double>(points),
+              static_cast<double>(config_.initialisation.min_landmarks)};
+  return points >= config_.initialisation.min_landmarks;
 }
 
 const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
@@ -160,24 +214,27 @@ const InitialPair* Initialiser::add(const std::shared_ptr<Frame>& frame) {
   remember(frame);
   if (!reference_) {
     set_reference(frame);
+    refusal_ = {.reason = Reason::kStanding};
     return nullptr;
   }
   match(*frame);
   last_matches_ = static_cast<int>(pairs_.size());
-  const auto age = frame->number - reference_->number;
+  const std::int64_t age_us = frame->utime - reference_->utime;
+  const std::int64_t half_utime = reference_->utime + age_us / 2;
   most_matches_ = std::max(most_matches_, last_matches_);
-  forget_pixels(age);
+  forget_pixels(half_utime);
   const int wanted = std::max(kMinMatches, static_cast<int>(kMinMatchShare * most_matches_));
-  if (last_matches_ < wanted || static_cast<double>(age) > config_.initialisation.max_frames) {
+  if (last_matches_ < wanted || 1e-6 * static_cast<double>(age_us) > config_.initialisation.max_age_s) {
     // The reference has gone out of sight: a frame half way is the next one. Where that is too far as well,
     // or there is none, this one.
-    const std::uint64_t half = reference_->number + (age + 1) / 2;
-    const auto next = std::find_if(history_.begin(), history_.end(),
-                                   [&](const auto& f) { return f->number >= half && f->has_pixels(); });
-    set_reference(next != history_.end() && age > 1 ? *next : frame);
+    const auto next = std::find_if(history_.begin(), history_.end(), [&](const auto& f) {
+      return f != reference_ && f->utime >= half_utime && f->has_pixels();
+    });
+    set_reference(next != history_.end() ? *next : frame);
     match(*frame);
     last_matches_ = static_cast<int>(pairs_.size());
     most_matches_ = last_matches_;
+    refusal_ = {Reason::kFewMatches, static_cast<double>(last_matches_), static_cast<double>(wanted)};
     if (last_matches_ < wanted) set_reference(frame);
     return nullptr;
   }

@@ -18,19 +18,23 @@ double mean_parallax_px(const LocalView& view, const TrackOutcome& outcome) {
 
 bool wants_keyframe(const EstimatorConfig& config, const LocalView& view, const TrackOutcome& outcome,
                     const KeyframeSituation& situation) {
-  if (situation.frames_since_keyframe < config.keyframes.min_interval_frames || !situation.mapping_free)
+  // A frame that comes a little early is not left out for the next.
+  constexpr double kEarly_s = 0.001;
+  if (situation.since_keyframe_s < config.keyframes.min_interval_s - kEarly_s || !situation.mapping_free)
     return false;
   // Too few to be worth building on.
   if (outcome.inliers < config.tracking.min_matches) return false;
-  const bool moved = outcome.median_motion_px > config.keyframes.min_parallax_px;
-  const bool drifted = outcome.median_motion_px > 0.25 * config.keyframes.min_parallax_px;
-  const bool old = situation.frames_since_keyframe >= config.keyframes.max_interval_frames;
+  const double min_parallax_px =
+      config.keyframes.min_parallax_rad * view.rig.cameras.front().camera.focal_px();
+  const bool moved = outcome.median_motion_px > min_parallax_px;
+  const bool drifted = outcome.median_motion_px > 0.25 * min_parallax_px;
+  const bool old = situation.since_keyframe_s >= config.keyframes.max_interval_s - kEarly_s;
   const bool thin = outcome.reference_inliers < config.keyframes.tracked_ratio * view.reference_landmarks;
   const bool very_thin = outcome.reference_inliers < 0.5 * view.reference_landmarks;
   // By number distant landmarks, which stay in the image, hide that the near ones, which hold the
   // translation, have left it. Counted by nearness they do not; nor do they hide that the camera has moved.
   const bool near_gone = outcome.reference_nearness < 0.5 * view.reference_nearness &&
-                         mean_parallax_px(view, outcome) > 0.25 * config.keyframes.min_parallax_px;
+                         mean_parallax_px(view, outcome) > 0.25 * min_parallax_px;
   // Standing still nothing is new, however old the keyframe; turning on the spot only what leaves the image
   // counts.
   return moved || (old && drifted) || (thin && drifted) || very_thin || near_gone;

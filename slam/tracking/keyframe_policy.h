@@ -9,7 +9,7 @@
 namespace farpoint::slam {
 
 struct KeyframeSituation {
-  int frames_since_keyframe = 0;
+  double since_keyframe_s = 0;
   bool mapping_free = false;  // mapping could start on it at once
 };
 

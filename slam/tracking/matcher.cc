@@ -12,7 +12,7 @@ namespace farpoint::slam {
 
 namespace {
 
-constexpr double kBorderPx = 4.0;
+constexpr double kBorderPx = 4.0;  // of the image, and of its mask
 // Sigmas of a landmark's depth that the search window takes in, and the most that they widen it.
 constexpr double kDepthSigmas = 2.0, kMostDepthPx = 20.0;
 // How far alignment may move from the corner, pixels of the corner's level.
@@ -83,7 +83,7 @@ void Matcher::project_into(int index, const SE3& T_world_body, LandmarkSubset su
     if (!in_subset(i, subset)) continue;
     const ViewLandmark& l = view_->landmarks[i];
     if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &c.prediction)) continue;
-    if (!is_matchable(c.prediction)) continue;
+    if (!is_matchable(c.prediction) || rig_camera.is_masked(c.prediction.pixel, kBorderPx)) continue;
     c.view_index = static_cast<std::uint32_t>(i);
     c.level = predicted_level(l.host_level, c.prediction.scale_change,
                               static_cast<float>(pyramid_.scale_factor), pyramid_.levels);
@@ -170,6 +170,50 @@ bool Matcher::align_one(const Frame& frame, const Prediction& prediction, Match*
   match->sigma_px = std::hypot(a.sigma_px, static_cast<float>(config_.pixel_sigma_px));
   match->aligned = true;
   return true;
+}
+
+void Matcher::measure_further(const Frame& frame, const SE3& T_world_body) {
+  if (frame.views.size() < 2 || !view_->judgement.metric) return;
+  const StageSpan span(listener_, Stage::kAlignment);
+  const std::size_t matches = matches_.size();
+  for (int c = 1; c < frame.views.size(); ++c)
+    if (frame.views[c].image && frame.views[c].set.features.empty())
+      measure_in(frame, c, T_world_body, matches);
+}
+
+void Matcher::measure_in(const Frame& frame, int index, const SE3& T_world_body, std::size_t matches) {
+  const RigCamera& rig_camera = camera(index);
+  const Predictor predictor(rig_camera.camera, (T_world_body * rig_camera.T_body_camera).inverse());
+  for (std::size_t i = 0; i < matches; ++i) {
+    const Match& first = matches_[i];
+    if (!first.aligned || first.camera != 0) continue;
+    const ViewLandmark& l = landmark_of(first);
+    const std::int32_t candidate = candidate_of_[slot(0, first.view_index)];
+    const Prediction& seen = candidates_[static_cast<std::size_t>(candidate)].prediction;
+    Prediction p;
+    if (!predictor.predict(l.point_w, l.anchor_w, l.d_point_d_pixel, kBorderPx, &p) || !is_matchable(p))
+      continue;
+    // The pose's error moves the landmark in both images alike; so much is known from the first.
+    const Eigen::Matrix2d between = (p.A_target_host * seen.A_target_host.inverse()).cast<double>();
+    const Eigen::Vector2d moved = between * (first.pixel.cast<double>() - seen.pixel);
+    const double open_px = kDepthSigmas * l.inverse_depth_sigma *
+                           (p.d_pixel_d_inverse_depth - between * seen.d_pixel_d_inverse_depth).norm();
+    const double reach_px =
+        kMaxAlignmentShiftPx *
+        level_scale_[static_cast<std::size_t>(predicted_level(
+            l.host_level, p.scale_change, static_cast<float>(pyramid_.scale_factor), pyramid_.levels))];
+    if (!(open_px <= reach_px)) continue;
+    const Alignment a = frame.views[index].image->align(
+        l.patch, p.A_target_host, (p.pixel + moved).cast<float>(), static_cast<float>(reach_px));
+    if (!a.ok) continue;
+    Match m = first;
+    m.camera = static_cast<std::uint8_t>(index);
+    m.further = true;
+    m.pixel = a.pixel;
+    m.sigma_px = std::hypot(a.sigma_px, static_cast<float>(config_.pixel_sigma_px));
+    m.inlier = true;
+    matches_.push_back(m);
+  }
 }
 
 void Matcher::drop_outliers() {

@@ -24,6 +24,7 @@ struct Match {
   float sigma_px = 1.0F;                            // its error, level-0 pixels
   bool aligned = false;
   bool inlier = false;
+  bool further = false;  // by measure_further(): beside a match of camera 0, whose feature it has
   std::uint8_t camera = 0;
 };
 
@@ -81,6 +82,10 @@ class Matcher {
   // Measures each match to a fraction of a pixel. Drops a match that does not align or is no candidate, and
   // frees the feature of one that does not align. Without pixels the matches stay as they are.
   void align(const Frame& frame);
+  // Looks for each aligned match of camera 0 in the further cameras' pixels, where the landmark's depth and a
+  // body at this pose put it, and adds what aligns as matches of those cameras: with the feature of camera 0.
+  // Landmarks whose depth leaves their place open by more than alignment finds are left out.
+  void measure_further(const Frame& frame, const SE3& T_world_body);
   // Drops the matches that are no inliers and frees their features.
   void drop_outliers();
 
@@ -105,6 +110,7 @@ class Matcher {
   [[nodiscard]] std::size_t slot(int camera, std::uint32_t view_index) const {
     return static_cast<std::size_t>(camera) * view_->landmarks.size() + view_index;
   }
+  void measure_in(const Frame& frame, int index, const SE3& T_world_body, std::size_t matches);
   [[nodiscard]] bool align_one(const Frame& frame, const Prediction& prediction, Match* match) const;
 
   const TrackingConfig config_;

@@ -30,6 +30,7 @@ std::size_t PoseRefiner::bytes() const {
 PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& prior) {
   const StageSpan span(listener_, Stage::kPose);
   measurements_.clear();
+  const double further_sigma_factor = matcher_.view()->judgement.further_sigma_factor;
   for (const Match& m : matcher_.matches()) {
     const ViewLandmark& l = matcher_.landmark_of(m);
     PoseMeasurement pm;
@@ -37,7 +38,7 @@ PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& 
     pm.anchor_w = l.anchor_w;
     pm.inverse_depth_sigma = l.inverse_depth_sigma;
     pm.pixel = m.pixel.cast<double>();
-    pm.sigma_px = m.sigma_px;
+    pm.sigma_px = m.further ? further_sigma_factor * m.sigma_px : m.sigma_px;
     pm.camera = m.camera;
     measurements_.push_back(pm);
   }
@@ -56,10 +57,11 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   matcher_.align(frame);
   out.matches = static_cast<int>(matcher_.matches().size());
   if (out.matches < config_.min_matches / 2) return out;
+  matcher_.measure_further(frame, T_world_body_start);
   const PoseSolution s = solve(T_world_body_start, prior);
   out.T_world_body = s.T_world_body;
   out.covariance = s.covariance;
-  out.inliers = s.inliers;
+  out.inliers = s.inliers - further_inliers();
   out.rms = s.rms;
   count_inliers(&out);
   out.ok = s.ok && s.inliers >= config_.min_inliers / 2;
@@ -67,11 +69,21 @@ TrackOutcome PoseRefiner::refine(const Frame& frame, const SE3& T_world_body_sta
   return out;
 }
 
+// A landmark counts once, however many cameras measure it.
+int PoseRefiner::further_inliers() const {
+  const auto& matches = matcher_.matches();
+  return static_cast<int>(
+      std::count_if(matches.begin(), matches.end(), [](const Match& m) { return m.further && m.inlier; }));
+}
+
 void PoseRefiner::count_inliers(TrackOutcome* outcome) const {
   for (const Match& m : matcher_.matches()) {
+    if (m.further) continue;
+    const ViewLandmark& l = matcher_.landmark_of(m);
+    if (l.confirmed) ++outcome->confirmed_matches;
     if (!m.inlier) continue;
     if (m.aligned) ++outcome->aligned;
-    const ViewLandmark& l = matcher_.landmark_of(m);
+    if (l.confirmed) ++outcome->confirmed_inliers;
     if (!l.in_reference || !l.confirmed) continue;
     ++outcome->reference_inliers;
     outcome->reference_nearness += l.nearness;

@@ -32,6 +32,7 @@ class PoseRefiner {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
+  [[nodiscard]] int further_inliers() const;
   void count_inliers(TrackOutcome* outcome) const;
   [[nodiscard]] double motion_since_reference_px(const SE3& T_world_body);
   void add_motions_of(int index, const SE3& T_world_body);

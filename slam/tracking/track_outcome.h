@@ -9,15 +9,16 @@ namespace farpoint::slam {
 struct TrackOutcome {
   bool ok = false;  // a pose that may be used
   SE3 T_world_body;
-  Matrix6d covariance = Matrix6d::Zero();  // (dt, dphi) of se3.h
-  int matches = 0;                         // after the local search
-  int inliers = 0, aligned = 0;            // of the final pose
-  int reference_inliers = 0;               // inliers among the reference keyframe's landmarks
-  double reference_nearness = 0;           // sum of their nearness, 1 / map units
-  int expected = 0;                        // landmarks that project into the image
-  double usually_found = 0;                // of these, by their share of frames; relocalisation only
-  double median_motion_px = 0;             // of inliers since the reference keyframe, without rotation
-  double rms = 0;                          // of the inliers' residuals, in sigmas
+  Matrix6d covariance = Matrix6d::Zero();            // (dt, dphi) of se3.h
+  int matches = 0;                                   // after the local search
+  int inliers = 0, aligned = 0;                      // of the final pose
+  int confirmed_matches = 0, confirmed_inliers = 0;  // of landmarks whose probation has ended
+  int reference_inliers = 0;                         // inliers among the reference keyframe's landmarks
+  double reference_nearness = 0;                     // sum of their nearness, 1 / map units
+  int expected = 0;                                  // landmarks that project into the image
+  double usually_found = 0;     // of these, by their share of frames; relocalisation only
+  double median_motion_px = 0;  // of inliers since the reference keyframe, without rotation
+  double rms = 0;               // of the inliers' residuals, in sigmas
 
   // Least share of inliers among the matches. Rigid scenes show 0.7 and more.
   static constexpr double kMinAgreement = 0.65;

@@ -137,7 +137,7 @@ void Tracker::note_seen() {
     counter_.add_visible(view.landmarks[c.view_index].handle);
   last_seen_.clear();
   for (const Match& m : matcher_.matches()) {
-    if (!m.inlier) continue;
+    if (!m.inlier || m.further) continue;
     const LandmarkHandle h = matcher_.landmark_of(m).handle;
     counter_.add_found(h);
     last_seen_.push_back(h);

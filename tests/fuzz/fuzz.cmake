@@ -7,7 +7,8 @@ file(GLOB_RECURSE fuzzed CONFIGURE_DEPENDS
      ${CMAKE_SOURCE_DIR}/daemon/config/*.cc ${CMAKE_SOURCE_DIR}/tools/common/*.cc ${CMAKE_SOURCE_DIR}/tools/evaluate/*.cc
      ${CMAKE_SOURCE_DIR}/tools/report/*.cc ${CMAKE_SOURCE_DIR}/tools/trajectory/*.cc ${CMAKE_CURRENT_LIST_DIR}/*.cc)
 list(FILTER fuzzed EXCLUDE REGEX "(_main|_test|/daemon/config/(options|build_info))[.]cc$")
-foreach(reader bag bag_file bag_topics byte_file chunk images mcap recording rectified_pair ros_bag ros_message sqlite_bag)
+foreach(reader bag bag_file bag_topics byte_file chunk euroc images kaist kitti mcap recording rectified_pair ros_bag ros_message sqlite_bag
+        tum zurich)
   list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/tools/import/${reader}.cc)
 endforeach()
 list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/daemon/system/control_socket.cc ${CMAKE_SOURCE_DIR}/daemon/system/service_log.cc
@@ -42,7 +43,7 @@ target_link_libraries(farpoint_fuzzed PUBLIC farpoint_fuzz_base farpoint_beside_
 target_link_libraries(farpoint_beside_fuzzed INTERFACE $<LINK_ONLY:farpoint_fuzzed>)
 
 add_custom_target(fuzz)
-foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps)
+foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps mavlink layout)
   add_executable(fuzz_${name} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/fuzz_main.cc)
   target_compile_definitions(fuzz_${name} PRIVATE FARPOINT_FUZZ_TARGET="${name}")
   target_link_libraries(fuzz_${name} PRIVATE farpoint_fuzzed)

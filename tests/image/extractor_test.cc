@@ -16,7 +16,7 @@ namespace {
 using testing::OwnedImage;
 
 FeatureSet extract(const OwnedImage& image, const ExtractorOptions& options = {},
-                   const PyramidOptions& levels = {}, const ImageView& mask = {}) {
+                   const PyramidOptions& levels = {}, const ImageMask* mask = nullptr) {
   Pyramid pyramid(image.width, image.height, levels);
   pyramid.build(image.view());
   Extractor extractor(image.width, image.height, levels, options);
@@ -124,15 +124,16 @@ TEST(Extractor, AFlatImageGivesNothing) {
 
 TEST(Extractor, MaskedPixelsGiveNoCorner) {
   const OwnedImage image = testing::rectangles(400, 300, 400, 6);
-  OwnedImage mask(400, 300, 255);
+  OwnedImage pixels(400, 300, 255);
   for (int y = 0; y < 300; ++y) {
-    for (int x = 150; x < 400; ++x) mask.at(x, y) = 0;
+    for (int x = 150; x < 400; ++x) pixels.at(x, y) = 0;
   }
-  const FeatureSet set = extract(image, {.features = 400}, {}, mask.view());
+  const ImageMask mask(400, 300, pixels.pixels);
+  const FeatureSet set = extract(image, {.features = 400}, {}, &mask);
   EXPECT_GT(set.features.size(), 100U);
-  for (const Feature& f : set.features) EXPECT_LT(f.u_px, 150);
-  const OwnedImage nothing(400, 300, 0);
-  EXPECT_TRUE(extract(image, {}, {}, nothing.view()).features.empty());
+  for (const Feature& f : set.features) EXPECT_LT(f.u_px, 150 - 18);
+  const ImageMask everything(400, 300, OwnedImage(400, 300, 0).pixels);
+  EXPECT_TRUE(extract(image, {}, {}, &everything).features.empty());
 }
 
 // The left part has strong corners everywhere, the right part only weak ones: they must not be crowded out.

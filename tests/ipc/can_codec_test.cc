@@ -83,7 +83,7 @@ OdometryEpoch random_epoch(std::mt19937_64& rng) {
   e.reset_counter = static_cast<std::uint32_t>(rng() % 256);
   e.predicted = rng() % 2 == 0;
   e.boot_counter = static_cast<std::uint8_t>(rng() % 256);
-  e.reason = static_cast<CanReason>(rng() % 12);
+  e.reason = static_cast<Reason>(rng() % 12);
   e.map_id = static_cast<std::int32_t>(rng() % 256);
   e.levelled = rng() % 2 == 0 ? CanYesNo::kYes : CanYesNo::kNo;
   e.body_is_camera = rng() % 2 == 0 ? CanYesNo::kYes : CanYesNo::kNo;

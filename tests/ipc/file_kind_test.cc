@@ -24,6 +24,16 @@ std::string name_of(std::string_view head) {
   return kind ? kind->name : "";
 }
 
+std::string advice_of(std::string_view head) {
+  const auto kind = recognise_file({reinterpret_cast<const std::uint8_t*>(head.data()), head.size()});
+  return kind ? kind->advice : "";
+}
+
+TEST(FileKind, EachBagIsForTheSameImport) {
+  for (const std::string_view head : {"#ROSBAG V2.0\n"sv, "\x89MCAP0\r\n"sv, "SQLite format 3\0\x10"sv})
+    EXPECT_EQ(advice_of(head), "'farpoint import bag' reads it");
+}
+
 TEST(FileKind, RecordersAndVideosAreRecognised) {
   EXPECT_EQ(name_of("#ROSBAG V2.0\nx"), "a ROS 1 bag");
   EXPECT_EQ(name_of("\x89MCAP0\r\n\x01"), "an MCAP recording");

@@ -82,7 +82,7 @@ TEST_F(MapperTest, StartsAMapFromTwoViews) {
   EXPECT_EQ(view->reference_id, 2U);
   EXPECT_EQ(view->keyframes.size(), 2U);
   EXPECT_GT(view->landmarks.size(), 100U);
-  EXPECT_FALSE(view->settled);
+  EXPECT_FALSE(view->judgement.steady);
   EXPECT_EQ(mapper.counts().landmarks_made, view->landmarks.size());
   EXPECT_EQ(mapper.counts().keyframes_made, 2U);
   EXPECT_EQ(mapper.counts().local_ba, 1U);
@@ -178,7 +178,7 @@ TEST_F(MapperTest, RefineCorrectsAKeyframeThatCameInWrong) {
 TEST_F(MapperTest, DriveSettlesInTheTruePlaces) {
   const auto view = drive(6);
   ASSERT_TRUE(view);
-  EXPECT_TRUE(view->settled);
+  EXPECT_TRUE(view->judgement.steady);
   EXPECT_GT(view->landmarks.size(), kKnown);
   expect_true_places(*view, 5e-3);
   EXPECT_EQ(mapper.counts().local_ba, 6U);

@@ -31,16 +31,18 @@ const ViewLandmark* find(const LocalView& view, LandmarkHandle handle) {
   return nullptr;
 }
 
+const MapJudgement kSteady{.steady = true};
+
 TEST(ViewBuilder, KeyframesHaveTheirOwnPosesByAscendingId) {
   Drive d;
   ViewBuilder builder(d.w.config, &d.w.map);
-  const auto view = builder.build(d.k[3], true);
+  const auto view = builder.build(d.k[3], kSteady);
   ASSERT_TRUE(view);
   EXPECT_EQ(view->reference_id, d.w.id(d.k[3]));
   EXPECT_EQ(view->T_world_reference.t, test::PointWorld::pose(3).t);
   EXPECT_EQ(view->map_id, 1);
   EXPECT_EQ(view->map_keyframes, 4);
-  EXPECT_TRUE(view->settled);
+  EXPECT_TRUE(view->judgement.steady);
   ASSERT_EQ(view->keyframes.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(view->keyframes[i].id, d.w.id(d.k[i]));
@@ -55,20 +57,20 @@ TEST(ViewBuilder, KeyframesHaveTheirOwnScales) {
   ViewBuilder builder(d.w.config, &d.w.map);
   d.w.map.correct_keyframe(d.k[1], {2.0, Eigen::Quaterniond::Identity(), {0, 0, 0}});
   d.w.map.correct_keyframe(d.k[3], {3.0, Eigen::Quaterniond::Identity(), {0, 0, 0}});
-  const auto view = builder.build(d.k[3], true);
+  const auto view = builder.build(d.k[3], kSteady);
   ASSERT_EQ(view->keyframes.size(), 4U);
   EXPECT_EQ(view->keyframes[0].scale, 1.0);
   EXPECT_EQ(view->keyframes[1].scale, 2.0);
   EXPECT_EQ(view->keyframes[3].scale, 3.0);
   EXPECT_EQ(view->reference_scale, 3.0);
-  EXPECT_EQ(builder.build(d.k[1], true)->S_world_reference().scale, 2.0);
+  EXPECT_EQ(builder.build(d.k[1], kSteady)->S_world_reference().scale, 2.0);
 }
 
 TEST(ViewBuilder, EveryLandmarkAppearsOnceAndInItsPlace) {
   Drive d;
   ViewBuilder builder(d.w.config, &d.w.map);
-  const auto view = builder.build(d.k[3], false);
-  EXPECT_FALSE(view->settled);
+  const auto view = builder.build(d.k[3], {});
+  EXPECT_FALSE(view->judgement.steady);
   ASSERT_EQ(view->landmarks.size(), d.landmarks.size());
   std::set<std::uint32_t> slots;
   for (const ViewLandmark& l : view->landmarks) {
@@ -85,10 +87,10 @@ TEST(ViewBuilder, EveryLandmarkAppearsOnceAndInItsPlace) {
 TEST(ViewBuilder, MovedKeyframeMovesItsLandmarksInTheNextView) {
   Drive d;
   ViewBuilder builder(d.w.config, &d.w.map);
-  const auto before = builder.build(d.k[3], false);
+  const auto before = builder.build(d.k[3], {});
   const Eigen::Vector3d moved(0.5, -0.25, 0.125);
   d.w.map.keyframes()[d.k[0]].T_world_body.t += moved;
-  const auto after = builder.build(d.k[3], false);
+  const auto after = builder.build(d.k[3], {});
   const ViewLandmark &a = before->landmarks.front(), &b = after->landmarks.front();
   ASSERT_EQ(a.handle, b.handle);
   EXPECT_LT((b.point_w.head<3>() / b.point_w[3] - a.point_w.head<3>() / a.point_w[3] - moved).norm(), 1e-9);
@@ -101,7 +103,7 @@ TEST(ViewBuilder, LandmarksSayHowOftenTheyAreFound) {
   often.visible = 10, often.found = 9;
   Landmark& seldom = *d.w.map.landmarks().get(d.landmarks[1]);
   seldom.visible = 40, seldom.found = 4;
-  const auto view = builder.build(d.k[3], true);
+  const auto view = builder.build(d.k[3], kSteady);
   ASSERT_TRUE(view);
   EXPECT_FLOAT_EQ(find(*view, d.landmarks[0])->found_share, 0.9F);
   EXPECT_FLOAT_EQ(find(*view, d.landmarks[1])->found_share, 0.1F);
@@ -112,10 +114,10 @@ TEST(ViewBuilder, RemovedLandmarksAreNotInTheNextView) {
   ViewBuilder builder(d.w.config, &d.w.map);
   // Every view of the pool holds it once.
   for (std::size_t i = 0; i < ViewBuilder::kViews; ++i)
-    EXPECT_NE(find(*builder.build(d.k[3], false), d.landmarks[5]), nullptr);
+    EXPECT_NE(find(*builder.build(d.k[3], {}), d.landmarks[5]), nullptr);
   d.w.map.remove_landmark(d.landmarks[5]);
   for (std::size_t i = 0; i < ViewBuilder::kViews; ++i) {
-    const auto view = builder.build(d.k[3], false);
+    const auto view = builder.build(d.k[3], {});
     EXPECT_EQ(find(*view, d.landmarks[5]), nullptr);
     EXPECT_EQ(view->landmarks.size(), d.landmarks.size() - 1);
     EXPECT_EQ(view->keyframes.size(), 4U);
@@ -135,7 +137,7 @@ TEST(ViewBuilder, VirtualPointsNeedSightingsAndNoFailedPromotion) {
   make_virtual(1, 1);
   make_virtual(d.landmarks.size() - 1, 0);  // two sightings only
   ViewBuilder builder(d.w.config, &d.w.map);
-  const auto view = builder.build(d.k[3], false);
+  const auto view = builder.build(d.k[3], {});
   ASSERT_NE(find(*view, d.landmarks[0]), nullptr);
   EXPECT_FALSE(find(*view, d.landmarks[0])->confirmed);
   EXPECT_EQ(find(*view, d.landmarks[1]), nullptr);
@@ -148,7 +150,7 @@ TEST(ViewBuilder, FullViewHoldsTheReferencesLandmarksFirst) {
   Drive d(config);
   ViewBuilder builder(d.w.config, &d.w.map);
   const std::size_t bytes = builder.bytes();
-  const auto view = builder.build(d.k[3], false);
+  const auto view = builder.build(d.k[3], {});
   EXPECT_EQ(view->landmarks.size(), 20U);
   for (const ViewLandmark& l : view->landmarks) EXPECT_TRUE(l.in_reference);
   EXPECT_EQ(view->keyframes.size(), 4U);
@@ -166,7 +168,7 @@ TEST(ViewBuilder, ReferenceIsSummarised) {
   ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[1], 0));
   ASSERT_TRUE(d.w.map.remove_observation(seldom, d.k[2], 0));
   ViewBuilder builder(d.w.config, &d.w.map);
-  const auto view = builder.build(d.k[3], false);
+  const auto view = builder.build(d.k[3], {});
   int confirmed = 0;
   double nearness = 0.0;
   std::vector<double> depths;
@@ -192,16 +194,16 @@ TEST(ViewBuilder, ExhaustedPoolGivesNoViewUntilOneIsDropped) {
   ViewBuilder builder(d.w.config, &d.w.map);
   std::vector<std::shared_ptr<const LocalView>> held;
   for (std::size_t i = 0; i < ViewBuilder::kViews; ++i) {
-    held.push_back(builder.build(d.k[3], false));
+    held.push_back(builder.build(d.k[3], {}));
     ASSERT_TRUE(held.back());
     EXPECT_EQ(held.back()->sequence, i + 1);
   }
-  EXPECT_EQ(builder.build(d.k[3], false), nullptr);
+  EXPECT_EQ(builder.build(d.k[3], {}), nullptr);
   // The views in use are untouched.
   for (std::size_t i = 0; i < held.size(); ++i) EXPECT_EQ(held[i]->sequence, i + 1);
   const LocalView* dropped = held[2].get();
   held[2].reset();
-  const auto view = builder.build(d.k[3], false);
+  const auto view = builder.build(d.k[3], {});
   EXPECT_EQ(view.get(), dropped);
   EXPECT_EQ(view->sequence, ViewBuilder::kViews + 1);
   EXPECT_EQ(view->landmarks.size(), held[0]->landmarks.size());
@@ -211,7 +213,7 @@ TEST(ViewBuilder, OtherMapsKeyframesDoNotCount) {
   Drive d;
   d.w.maker.make(*d.w.world.frame(5), test::PointWorld::pose(5), 2);
   ViewBuilder builder(d.w.config, &d.w.map);
-  EXPECT_EQ(builder.build(d.k[3], false)->map_keyframes, 4);
+  EXPECT_EQ(builder.build(d.k[3], {})->map_keyframes, 4);
 }
 
 }  // namespace

@@ -163,7 +163,7 @@ class LandmarkMakerTest : public ::testing::Test {
                                     counts_.vmp_rejected + counts_.vmp_evicted);
   }
 
-  const slam::Rig rig_ = plain_rig();
+  slam::Rig rig_ = plain_rig();
   slam::EstimatorConfig config_;
   SimImage::Options image_;
   slam::MappingCounts counts_;
@@ -267,6 +267,22 @@ TEST_F(LandmarkMakerTest, KeyframesThatLookElsewhereAreNotAsked) {
   const SE3 backwards{Eigen::Quaterniond(0, 0, 1, 0), {0.5, 0.0, 0.0}};
   const KeyframeHandle a = look(0.0, {kNear}), c = look(backwards, {}), b = look(1.0, {kNear});
   maker_->process(b, {a, c});
+  ASSERT_NE(landmark(b, kNear.id), nullptr);
+  EXPECT_NE(landmark(b, kNear.id)->state, LandmarkState::kBearing);
+}
+
+// The same as APairThatOtherKeyframesDoNotBearOut..., except that a bonnet hides the place in both of them.
+TEST_F(LandmarkMakerTest, KeyframesThatHaveTheirMaskThereAreNotAsked) {
+  std::vector<std::uint8_t> pixels(640 * 480, 255);
+  for (const double x_m : {0.3, 0.6}) {
+    Vector2d pixel;
+    ASSERT_TRUE(rig_.cameras[0].camera.project(kNear.position - Vector3d(x_m, 0, 0), &pixel));
+    pixels[static_cast<std::size_t>(std::lround(pixel.y()) * 640 + std::lround(pixel.x()))] = 0;
+  }
+  rig_.cameras[0].mask = std::make_shared<const slam::ImageMask>(640, 480, pixels);
+  use(slam::LandmarkMode::kVmp);
+  const KeyframeHandle a = look(0.0, {kNear}), c = look(0.3, {}), d = look(0.6, {}), b = look(1.0, {kNear});
+  maker_->process(b, {a, c, d});
   ASSERT_NE(landmark(b, kNear.id), nullptr);
   EXPECT_NE(landmark(b, kNear.id)->state, LandmarkState::kBearing);
 }

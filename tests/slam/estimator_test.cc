@@ -12,6 +12,18 @@ TEST(Estimator, RefusesARigWithoutCamera) {
   EXPECT_THROW(Estimator(EstimatorConfig{}, Rig{}), std::invalid_argument);
 }
 
+TEST(Estimator, RefusesAMaskOfAnotherSizeThanTheCameras) {
+  SimulatedDrive drive;
+  Rig rig = drive.rig();
+  const int width = rig.cameras[0].camera.width_px(), height = rig.cameras[0].camera.height_px();
+  const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+                                         255);
+  rig.cameras[0].mask = std::make_shared<const ImageMask>(height, width, pixels);
+  EXPECT_THROW(Estimator(drive.config(), rig), std::invalid_argument);
+  rig.cameras[0].mask = std::make_shared<const ImageMask>(width, height, pixels);
+  EXPECT_NO_THROW(Estimator(drive.config(), rig));
+}
+
 TEST(Estimator, InspectionShowsTheMapThatTheCountsCount) {
   SimulatedDrive drive;
   Estimator estimator(drive.config(), drive.rig());

@@ -10,16 +10,20 @@ EstimatorConfig small_config() {
   EstimatorConfig config;
   config.extractor.features = 10;
   config.capacity.landmarks = 10;
-  config.mapping.quick_view_delay_frames = 1;
-  config.mapping.full_view_delay_frames = 3;
+  config.mapping.quick_view_delay_ms = 50;
+  config.mapping.full_view_delay_ms = 150;
   return config;
 }
 
 class MappingPortTest : public ::testing::Test {
  protected:
+  // Frames are 50 ms apart.
+  static std::int64_t time_of(std::uint64_t frame_number) {
+    return 50'000 * static_cast<std::int64_t>(frame_number);
+  }
   // Sends a job for this frame; false where the port has no room.
   bool send(std::uint64_t frame_number) {
-    MappingJob* job = port_.begin_job(MappingJobKind::kKeyframe, {frame_number, 1000, 1});
+    MappingJob* job = port_.begin_job(MappingJobKind::kKeyframe, {frame_number, time_of(frame_number), 1});
     if (job == nullptr) return false;
     port_.send_job();
     return true;
@@ -33,7 +37,7 @@ class MappingPortTest : public ::testing::Test {
     *slot = {};
     slot->number = ++replies_;
     slot->job_number = job->number;
-    slot->frame_number = job->frame_number;
+    slot->utime = job->utime;
     slot->stage = stage;
     slot->ends_job = ends_job;
     rings_.replies.end_push();
@@ -42,7 +46,7 @@ class MappingPortTest : public ::testing::Test {
   // Numbers of the replies that this frame takes.
   [[nodiscard]] std::vector<std::uint64_t> take(std::uint64_t frame_number, const ReplyLimit& limit = {}) {
     std::vector<std::uint64_t> out;
-    while (const MappingReply* reply = port_.take_reply(frame_number, limit)) {
+    while (const MappingReply* reply = port_.take_reply(time_of(frame_number), limit)) {
       out.push_back(reply->number);
       port_.release_reply();
     }
@@ -88,12 +92,13 @@ TEST_F(MappingPortTest, LockstepTakesAReplyItsDelayAfterTheJobsFrame) {
   EXPECT_EQ(take(8), Numbers{2});
 }
 
-TEST_F(MappingPortTest, LockstepTakesAFirstViewAndDoneJobsWithinTheFrame) {
+TEST_F(MappingPortTest, LockstepTakesDoneJobsWithinTheFrameAndAFirstViewAfterTheQuickDelay) {
   send(5);
   reply(MappingStage::kStarted, true);
   send(5);
   reply(MappingStage::kDone, true);
-  EXPECT_EQ(take(5), (Numbers{1, 2}));
+  EXPECT_EQ(take(5), Numbers{}) << "replies keep their order";
+  EXPECT_EQ(take(6), (Numbers{1, 2}));
 }
 
 TEST_F(MappingPortTest, ThreadsTakeRepliesUpToTheGivenNumber) {
@@ -114,24 +119,15 @@ TEST_F(MappingPortTest, AReplyThatWasReleasedKeepsNoView) {
 }
 
 TEST_F(MappingPortTest, MappingIsBusyUntilTheReplyThatEndsTheJobIsTaken) {
-  EXPECT_TRUE(port_.is_free(5));
+  EXPECT_TRUE(port_.is_free());
   send(5);
-  EXPECT_FALSE(port_.is_free(5));
+  EXPECT_FALSE(port_.is_free());
   reply(MappingStage::kQuick, false);
   reply(MappingStage::kFull, true);
   EXPECT_EQ(take(6), Numbers{1});
-  EXPECT_FALSE(port_.is_free(6));
+  EXPECT_FALSE(port_.is_free());
   EXPECT_EQ(take(8), Numbers{2});
-  EXPECT_TRUE(port_.is_free(8));
-}
-
-TEST_F(MappingPortTest, ANewMapsFirstViewKeepsMappingBusyAsAQuickViewDoes) {
-  port_.begin_map(5);
-  EXPECT_FALSE(port_.is_free(5));
-  EXPECT_TRUE(port_.is_free(6));
-  port_.begin_map(8);
-  port_.give_up_map();
-  EXPECT_TRUE(port_.is_free(8));
+  EXPECT_TRUE(port_.is_free());
 }
 
 TEST_F(MappingPortTest, RepliesOfAMapThatWasGivenUpAreToldFromThoseOfTheNext) {
@@ -140,11 +136,11 @@ TEST_F(MappingPortTest, RepliesOfAMapThatWasGivenUpAreToldFromThoseOfTheNext) {
   send(6);
   reply(MappingStage::kDone, true);
   reply(MappingStage::kDone, true);
-  const MappingReply* old = port_.take_reply(9, {});
+  const MappingReply* old = port_.take_reply(time_of(9), {});
   ASSERT_NE(old, nullptr);
   EXPECT_FALSE(port_.is_of_present_map(*old));
   port_.release_reply();
-  const MappingReply* present = port_.take_reply(9, {});
+  const MappingReply* present = port_.take_reply(time_of(9), {});
   ASSERT_NE(present, nullptr);
   EXPECT_TRUE(port_.is_of_present_map(*present));
 }

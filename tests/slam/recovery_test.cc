@@ -10,6 +10,7 @@ constexpr std::int64_t kInterval_us = 100'000;
 using Search = Recovery::Search;
 using Verdict = Recovery::Verdict;
 
+// Of a map that has settled.
 class RecoveryTest : public ::testing::Test {
  protected:
   // Frames at the camera's pace, each tracked.
@@ -26,11 +27,13 @@ class RecoveryTest : public ::testing::Test {
   [[nodiscard]] int lose_until_given_up(int most, std::int64_t interval_us, Verdict* verdict) {
     for (int i = 1; i <= most; ++i) {
       utime_ += interval_us;
-      *verdict = recovery_.note_lost(utime_, true, 50);
+      *verdict = recovery_.note_lost(utime_);
       if (*verdict != Verdict::kSearchOn) return i;
     }
     return 0;
   }
+
+  RecoveryTest() { recovery_.note_settled(); }
 
   Recovery recovery_;
   std::int64_t utime_ = 0;
@@ -81,12 +84,12 @@ TEST_F(RecoveryTest, ACandidateIsNotConfirmedAfterAGap) {
 
 TEST_F(RecoveryTest, IsLostAtTheFirstFrameAndRelocalisesFromTheSecond) {
   track(3);
-  (void)recovery_.note_lost(after(1), true, 50);
+  (void)recovery_.note_lost(after(1));
   EXPECT_EQ(recovery_.state(), State::kLost);
-  (void)recovery_.note_lost(after(2), true, 50);
+  (void)recovery_.note_lost(after(2));
   EXPECT_EQ(recovery_.state(), State::kRelocalising);
   recovery_.note_tracked();
-  (void)recovery_.note_lost(after(4), true, 50);
+  (void)recovery_.note_lost(after(4));
   EXPECT_EQ(recovery_.state(), State::kLost);
 }
 
@@ -100,6 +103,7 @@ TEST_F(RecoveryTest, GivesASlowCameraAsManyFramesAndAFastOneAsMuchTime) {
   Verdict verdict = Verdict::kSearchOn;
   EXPECT_EQ(lose_until_given_up(100, 1'000'000, &verdict), 16);
   recovery_.begin_map();
+  recovery_.note_settled();
   EXPECT_EQ(lose_until_given_up(100, kInterval_us / 5, &verdict), 77);
 }
 
@@ -110,21 +114,21 @@ TEST_F(RecoveryTest, CountsOnlyFramesLostInARow) {
   EXPECT_EQ(lose_until_given_up(16, kInterval_us, &verdict), 0);
 }
 
-TEST_F(RecoveryTest, DiscardsAYoungMapAtOnce) {
-  EXPECT_EQ(recovery_.note_lost(100, false, 50), Verdict::kDiscardMap);
+TEST_F(RecoveryTest, DiscardsAMapThatNeverSettledAndKeepsOneThatEverDid) {
   recovery_.begin_map();
-  EXPECT_EQ(recovery_.note_lost(200, true, 4), Verdict::kDiscardMap);
+  EXPECT_EQ(recovery_.note_lost(100), Verdict::kDiscardMap);
   recovery_.begin_map();
-  EXPECT_EQ(recovery_.note_lost(300, true, 5), Verdict::kSearchOn);
+  recovery_.note_settled();
+  EXPECT_EQ(recovery_.note_lost(200), Verdict::kSearchOn);
 }
 
 TEST_F(RecoveryTest, ANewMapIsNotLost) {
   track(3);
-  (void)recovery_.note_lost(after(1), true, 50);
+  (void)recovery_.note_lost(after(1));
   recovery_.set_candidate({});
   recovery_.begin_map();
   EXPECT_FALSE(recovery_.take_candidate());
-  (void)recovery_.note_lost(after(2), true, 50);
+  (void)recovery_.note_lost(after(2));
   EXPECT_EQ(recovery_.state(), State::kLost);
 }
 

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: alone_test.py BUILD_FOLDER SOURCE_FOLDER CPACK
 
-The .deb on a machine that has what it depends on and no clone: installed by dpkg it simulates, replays and reports; an
-upgrade keeps a changed configuration; removal keeps all of it; purge leaves nothing. The machine is a
-copy-on-write view of this one. tests/systemd/bare_test.py does the same on a bare Debian. Status 77 where it cannot run.
+The .deb on a machine that has what it depends on and no clone: installed by dpkg it simulates, replays, reports, checks and
+collects a bugreport; an upgrade keeps a changed configuration; removal keeps all of it; purge keeps what is not the
+package's. The machine is a copy-on-write view of this one. tests/systemd/bare_test.py does the same on a bare Debian.
+Status 77 where it cannot run.
 """
 
 import pathlib
@@ -48,6 +49,13 @@ def check_use(machine):
     machine.do("farpoint", "report", "out.lcm", "-o", "report.html")
     report = machine.path("/tmp/report.html").read_text()
     expect(report.rstrip().endswith("</html>") and "<svg" in report, "the report is no page with drawings")
+    camera = ("camera.driver=file", "camera.device=town.lcm", "camera.calibration=log")
+    table = machine.do("farpointd", "--check", *(word for setting in camera for word in ("--set", setting)))
+    expect("a log with images of 620 x 188" in table, "--check: " + table)
+    machine.do("farpoint", "bugreport", "-o", "fault.tar.gz")
+    taken = machine.do("tar", "-tzf", "fault.tar.gz")
+    for name in ("contents.txt", "versions/farpointd.txt", "state/check.txt", "configuration/farpoint.yaml"):
+        expect(f"farpoint-bugreport/{name}\n" in taken, f"the bugreport lacks {name}")
     for vehicle in ("car", "rover", "drone"):
         machine.do("farpoint", "dbc", "--config", f"/usr/share/farpoint/vehicles/{vehicle}/farpoint.yaml", "-o", "bus.dbc")
 
@@ -89,13 +97,18 @@ def check_removal(machine):
 
 
 def check_purge(machine):
-    machine.do("dpkg", "-P", "farpoint")
-    for name in (*USERS, *DAEMONS, CONFIGURATION):
+    said = machine.do("dpkg", "-P", "farpoint")
+    expect_users_files(machine, "the purge")
+    for name in (*DAEMONS, CONFIGURATION):
         expect(not machine.holds(name), f"the purge left {name}")
+    for folder in ("/etc/farpoint", "/var/lib/farpoint", "/var/log/farpoint"):
+        expect(f"{folder} holds files" in said, f"the purge does not name {folder}, which stays")
 
 
 def check_clean_purge(machine):
     """Where all files are the package's own, none stay."""
+    for name in USERS:
+        machine.path(name).unlink()
     listing = machine.do("dpkg-deb", "--contents", "/tmp/farpoint.deb").splitlines()
     files = [line.split(" ./", 1)[1].split(" -> ")[0] for line in listing]
     machine.do(*INSTALL, "/tmp/farpoint.deb")

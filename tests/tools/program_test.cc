@@ -42,6 +42,33 @@ TEST(Program, HelpTeaches) {
   EXPECT_NE(run_farpoint_program("evaluate --help").out.find("Examples:"), std::string::npos);
 }
 
+TEST(Program, HelpOfACommandIsItsHelp) {
+  EXPECT_EQ(run_farpoint_program("help").out, run_farpoint_program("--help").out);
+  for (const std::string command : {"evaluate", "import", "import video"}) {
+    const ProgramResult help = run_farpoint_program("help " + command);
+    EXPECT_EQ(help.status, 0) << command;
+    EXPECT_EQ(help.out, run_farpoint_program(command + " --help").out) << command;
+    EXPECT_NE(help.out, "");
+  }
+  expect_misuse("help improt", "unknown command 'improt'");
+  expect_misuse("help import ros", "unknown import 'ros'");
+}
+
+TEST(Program, VersionNamesTheBuildOfBothPrograms) {
+  const ProgramResult version = run_farpoint_program("--version");
+  EXPECT_EQ(version.status, 0);
+  EXPECT_EQ(version.out.find("farpoint 0."), 0U) << version.out;
+  const std::string daemon = run_shell(test::binary_dir() + "/bin/farpointd --version").out;
+  EXPECT_EQ("farpointd " + version.out.substr(9), daemon);
+}
+
+TEST(Program, WrongUseNamesTheCommandWhoseHelpExplainsIt) {
+  expect_misuse("--nonsense", "(see farpoint --help)");
+  expect_misuse("evaluate x.tum --nonsense", "--nonsense (see farpoint evaluate --help)");
+  expect_misuse("import bag x.bag --nonsense", "--nonsense (see farpoint import bag --help)");
+  expect_misuse("import bag", "(see farpoint import bag --help)");
+}
+
 TEST(Program, WrongUseIsStatusTwoAndOneLine) {
   const ScratchFolder folder;
   make_kitti(folder.path());

@@ -22,10 +22,10 @@ class KeyframePolicyTest : public testing::Test {
     outcome.T_world_body.t.x() = 1.0;
   }
 
-  bool wanted_with(int near, int distant, int frames_since_keyframe = 2) {
+  bool wanted_with(int near, int distant, double since_keyframe_s = 0.2) {
     outcome.inliers = outcome.reference_inliers = near + distant;
     outcome.reference_nearness = near * kNear + distant * kDistant;
-    return wants_keyframe(config, view, outcome, {frames_since_keyframe, true});
+    return wants_keyframe(config, view, outcome, {since_keyframe_s, true});
   }
 
   EstimatorConfig config;
@@ -49,11 +49,28 @@ TEST_F(KeyframePolicyTest, DoesNotMissDistantLandmarksWhileNearOnesStay) {
 
 // However fast mapping is: the local window would reach back too short a way.
 TEST_F(KeyframePolicyTest, KeepsADistanceFromTheLastKeyframe) {
-  EXPECT_FALSE(wanted_with(40, kOfEach, 1));
-  EXPECT_TRUE(wanted_with(40, kOfEach, 2));
-  config.keyframes.min_interval_frames = 3;
-  EXPECT_FALSE(wanted_with(40, kOfEach, 2));
-  EXPECT_TRUE(wanted_with(40, kOfEach, 3));
+  config.keyframes.min_interval_s = 0.15;
+  EXPECT_FALSE(wanted_with(40, kOfEach, 0.14));
+  EXPECT_TRUE(wanted_with(40, kOfEach, 0.15));
+  config.keyframes.min_interval_s = 0.3;
+  EXPECT_FALSE(wanted_with(40, kOfEach, 0.28));
+  // A frame that comes a little early.
+  EXPECT_TRUE(wanted_with(40, kOfEach, 0.2995));
+}
+
+// The same view turns by the same angle, whatever the lens.
+TEST_F(KeyframePolicyTest, MotionInTheImageIsAnAngle) {
+  outcome.inliers = outcome.reference_inliers = 2 * kOfEach;
+  outcome.reference_nearness = view.reference_nearness;
+  for (const double focal_px : {160.0, 718.0}) {
+    Camera::Parameters p = view.rig.cameras.front().camera.parameters();
+    p.fx_px = p.fy_px = focal_px;
+    view.rig.cameras.front().camera = Camera(p);
+    outcome.median_motion_px = 1.1 * config.keyframes.min_parallax_rad * focal_px;
+    EXPECT_TRUE(wants_keyframe(config, view, outcome, {0.2, true})) << focal_px;
+    outcome.median_motion_px = 0.9 * config.keyframes.min_parallax_rad * focal_px;
+    EXPECT_FALSE(wants_keyframe(config, view, outcome, {0.2, true})) << focal_px;
+  }
 }
 
 TEST_F(KeyframePolicyTest, StandingStillNothingIsNew) {

@@ -95,6 +95,24 @@ TEST_F(MatcherTest, ANewViewHasNothingSeen) {
   EXPECT_TRUE(matcher.candidates().empty());
 }
 
+TEST_F(MatcherTest, LeavesOutWhatIsPredictedIntoTheMask) {
+  std::vector<std::uint8_t> pixels(640 * 480, 255);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    if (i % 640 < 300) pixels[i] = 0;
+  scene.rig.cameras[0].mask = std::make_shared<const ImageMask>(640, 480, pixels);
+  look(SE3{});
+  std::set<std::size_t> expected;
+  const SE3 T_camera_world = scene.rig.cameras[0].T_body_camera.inverse();
+  for (std::size_t i = 0; i < scene.points.size(); ++i) {
+    Eigen::Vector2d pixel;
+    ASSERT_TRUE(scene.rig.cameras[0].camera.project(T_camera_world * scene.points[i].position_w, &pixel));
+    if (pixel.x() > 304.0) expected.insert(i);
+  }
+  EXPECT_EQ(candidates(), expected);
+  EXPECT_GT(expected.size(), 50U);
+  EXPECT_LT(expected.size(), 150U);
+}
+
 TEST_F(MatcherTest, LeavesOutWhatCannotBeMatchedThere) {
   const std::size_t beside = scene.points.size();
   scene.add_point({330, 225}, 8.0);

@@ -45,7 +45,7 @@ MEASUREMENTS = "slam/measurement.h"
 SHARED_MAY_INCLUDE = {OPTIONS: {"slam/geometry", "slam/image"}, STAGES: set(), MEASUREMENTS: {"slam/geometry"}}
 # The tools read camera files and configurations and refuse input as the daemon does, and speak with it.
 SHARED_WITH_TOOLS = {"daemon/config/config.h", "daemon/config/errors.h", "daemon/config/yaml_file.h",
-                     "daemon/config/camera_file.h", "daemon/config/calibration_message.h",
+                     "daemon/config/camera_file.h", "daemon/config/build_info.h", "daemon/config/calibration_message.h",
                      "daemon/system/control_socket.h"}
 SHARED_READERS = {"slam", "slam/map", "slam/solver", "slam/tracking", "slam/mapping", "slam/loops", "slam/fusion"}
 # The estimator does no I/O, has no threads, no clock and no log.

@@ -4,9 +4,11 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
+#include "daemon/config/mask_file.h"
 #include "daemon/config/rig.h"
 #include "daemon/input/log_frame_source.h"
 #include "daemon/system/solver_loader.h"
@@ -57,13 +59,17 @@ BenchPass run_pass(const BenchOptions& options, const daemon::Config& config,
     const double began_s = daemon::process_cpu_s();
     if (!source.next(&frame, &clock)) break;
     if (!estimator) {
-      estimator = std::make_unique<slam::Estimator>(
-          config.estimator, daemon::make_rig(source.calibration(), config.camera.index));
+      slam::Rig rig = daemon::make_rig(source.calibration(), config.camera);
+      daemon::read_masks(config.camera, source.calibration(), &rig);
+      estimator = std::make_unique<slam::Estimator>(config.estimator, rig);
       estimator->listen(&clock);
     }
-    const slam::ImageView view{frame.image->data(), frame.image->width_px, frame.image->height_px,
-                               frame.image->width_px};
-    const slam::FrameInput input{frame.meta.utime, frame.meta.sequence, 0, view};
+    slam::FrameInput input{frame.meta.utime, frame.meta.sequence, 0, frame.view()};
+    slam::CameraImage second{1, {}};
+    if (frame.second != nullptr) {
+      second.image = daemon::SourceFrame::view_of(*frame.second);
+      input.others = std::span(&second, 1);
+    }
     const bool followed = estimator->process(input).followed();
     const double ended_s = daemon::process_cpu_s();
     if (!followed) clock.forget(timing_t::STAGE_TRACKING);

@@ -14,12 +14,14 @@ void add_import_command(CLI::App* app, Action* action);
 void add_export_command(CLI::App* app, Action* action);
 void add_dbc_command(CLI::App* app, Action* action);
 void add_evaluate_command(CLI::App* app, Action* action);
+void add_bugreport_command(CLI::App* app, Action* action);
 void add_bench_command(CLI::App* app, Action* action);
 void add_ctl_command(CLI::App* app, Action* action);
 void add_top_command(CLI::App* app, Action* action);
 void add_report_command(CLI::App* app, Action* action);
 void add_spy_command(CLI::App* app, Action* action);
 void add_simulate_command(CLI::App* app, Action* action);
+void add_mask_command(CLI::App* app, Action* action);
 
 // The whole program: parses, runs, and reports every failure by one line on standard error and an exit
 // status.

@@ -75,7 +75,7 @@ int import_images(const ImportOptions& options) {
   StampUnit unit = StampUnit::kAuto;
   Recording recording = read_images(options.folder, options.camera_file, options.times, &unit);
   const bool chosen = options.times.unit == StampUnit::kAuto && unit != StampUnit::kAuto;
-  const double rate_hz = recording.cameras[0].rate_hz;
+  const double rate_hz = median_rate_hz(recording, 0);  // the camera file may name another
   const int status = write_and_report(std::move(recording), options);
   if (chosen)
     std::printf("stamps were read as %s (%.4g pictures a second); --unit chooses another unit\n",
@@ -226,7 +226,10 @@ void add_video_command(CLI::App* import, const std::shared_ptr<ImportOptions>& o
   video->add_option("--rate", options->times.rate_hz, "Frames a second (default: the video's own times)");
   add_part(video, options.get());
   video->footer(
-      "Frames become grey PNG images of the size in the file, whatever orientation the file asks for.\n"
+      "Frames become grey PNG images of the size in the file, whatever orientation the file asks for. Levels "
+      "of\n"
+      "colour video go from 0 to 255, also where the file has 16 to 235; those of grey video stay as they "
+      "are.\n"
       "A raw MJPEG stream has no times and needs --rate.\n"
       "Example: farpoint import video drive.mp4 --camera front.yaml -o drive.lcm");
   video->callback([=] { *action = [=] { return import_video(*options); }; });

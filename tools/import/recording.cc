@@ -24,6 +24,8 @@ const RecordingImage& first_image_of(const Recording& recording, int camera) {
   return *found;  // the importers drop cameras without an image
 }
 
+}  // namespace
+
 double median_rate_hz(const Recording& recording, int camera) {
   std::vector<double> intervals_s;
   std::int64_t last_utime = -1;
@@ -34,8 +36,6 @@ double median_rate_hz(const Recording& recording, int camera) {
   }
   return intervals_s.empty() ? 0.0 : 1.0 / percentile(std::move(intervals_s), 50.0);
 }
-
-}  // namespace
 
 std::size_t bytes_a_pixel(RawEncoding encoding) {
   switch (encoding) {

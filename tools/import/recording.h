@@ -106,6 +106,8 @@ void add_camera(const daemon::CameraFile& content, const std::string& origin, co
 // Reads format and size from the header of an image file. Throws InputError naming `file`.
 [[nodiscard]] ipc::ImageInfo probe_image_file(const std::string& bytes, const std::filesystem::path& file);
 
+// By the median interval of the camera's images; 0: fewer than two.
+[[nodiscard]] double median_rate_hz(const Recording& recording, int camera);
 // Sets parameters.width/height of 0 from the first image of each camera, checks each camera, and fills an
 // unknown rate by the median interval of the images. Throws InputError naming the file `calibration`.
 void complete_cameras(const std::filesystem::path& calibration, Recording* recording);

@@ -2,7 +2,9 @@
 #include "tools/import/sqlite_bag.h"
 
 #include <sqlite3.h>
+#include <zstd.h>
 
+#include <algorithm>
 #include <cctype>
 #include <set>
 #include <utility>
@@ -16,6 +18,8 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxBlobBytes = (64 << 20) + (64 << 10);  // an image and the other fields of its message
 constexpr int kMaxNameBytes = 1024;
+constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
+constexpr std::uint64_t kMaxZstdHeadBytes = 18;  // of a frame, with the size of its content
 constexpr std::size_t kMaxTopics = 10'000;
 // Steps of SQLite's machine, after each million of which it asks whether to go on. A row takes some ten.
 constexpr int kStepsBetweenQuestions = 1'000'000, kMaxQuestionsOfRow = 3;
@@ -179,7 +183,8 @@ void SqliteBag::read_messages(const OnMessage& on_message) {
     message.received_ns = rows.integer(2);
     if (message.received_ns < 0) fail(message.place, "a time before 1970");
     if (rows.text(3) != "blob") fail(message.place, "expected a blob as data");
-    message.bytes = static_cast<std::uint64_t>(rows.integer(4));
+    message.bytes =
+        is_packed(message.place) ? content_bytes(message.place) : static_cast<std::uint64_t>(rows.integer(4));
     on_message(message);
   }
 }
@@ -215,6 +220,47 @@ void SqliteBag::open_blob(const BagPlace& place) {
 }
 
 std::string SqliteBag::read(const BagPlace& place, std::uint64_t bytes) {
+  if (!is_packed(place)) return read_blob(place, bytes);
+  const std::string_view content = unpacked(place).view();
+  if (place.offset > content.size() || bytes > content.size() - place.offset)
+    fail(place, "cut off, expected " + std::to_string(bytes) + " bytes");
+  return std::string(content.substr(place.offset, bytes));
+}
+
+bool SqliteBag::is_packed(const BagPlace& place) {
+  open_blob(place);
+  const auto size = static_cast<std::uint64_t>(sqlite3_blob_bytes(blob_));
+  return size >= kZstdMagic.size() && read_blob({place.part, 0}, kZstdMagic.size()) == kZstdMagic;
+}
+
+// As the frame's head names it.
+std::uint64_t SqliteBag::content_bytes(const BagPlace& place) {
+  const auto size = static_cast<std::uint64_t>(sqlite3_blob_bytes(blob_));
+  const std::string head = read_blob({place.part, 0}, std::min(size, kMaxZstdHeadBytes));
+  const unsigned long long bytes = ZSTD_getFrameContentSize(head.data(), head.size());
+  if (bytes == ZSTD_CONTENTSIZE_ERROR || bytes == ZSTD_CONTENTSIZE_UNKNOWN)
+    fail(place, "a packed message (zstd) that does not name the size of its content");
+  if (bytes > kMaxBlobBytes)
+    fail(place, "a packed message of " + std::to_string(bytes) + " bytes, expected at most " +
+                    std::to_string(kMaxBlobBytes));
+  return bytes;
+}
+
+const Chunk& SqliteBag::unpacked(const BagPlace& place) {
+  if (unpacked_row_ == place.part) return unpacked_;
+  unpacked_row_ = 0;
+  unpacked_ = {};
+  const std::uint64_t bytes = content_bytes(place);
+  const std::string packed =
+      read_blob({place.part, 0}, static_cast<std::uint64_t>(sqlite3_blob_bytes(blob_)));
+  std::optional<Chunk> content = decompress(Compression::kZstd, packed, bytes);
+  if (!content) fail(place, "a damaged message (zstd)");
+  unpacked_ = std::move(*content);
+  unpacked_row_ = place.part;
+  return unpacked_;
+}
+
+std::string SqliteBag::read_blob(const BagPlace& place, std::uint64_t bytes) {
   open_blob(place);
   const auto size = static_cast<std::uint64_t>(sqlite3_blob_bytes(blob_));
   if (place.offset > size || bytes > size - place.offset)

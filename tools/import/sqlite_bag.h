@@ -14,6 +14,9 @@ namespace farpoint::tools {
 
 inline constexpr std::string_view kSqliteMagic{"SQLite format 3\0", 16};
 
+// Messages that rosbag2 packed one by one (compression_mode message, zstd) are unpacked: CDR never begins as
+// a zstd frame does.
+//
 // A topic is a connection, a row of `messages` a part. The file is opened for reading only; no other file is
 // opened, whatever the database says.
 class SqliteBag : public BagFile {
@@ -34,11 +37,17 @@ class SqliteBag : public BagFile {
   void read_topics(const OnConnection& on_connection);
   void read_messages(const OnMessage& on_message);
   void open_blob(const BagPlace& place);
+  [[nodiscard]] std::string read_blob(const BagPlace& place, std::uint64_t bytes);
+  [[nodiscard]] bool is_packed(const BagPlace& place);
+  [[nodiscard]] std::uint64_t content_bytes(const BagPlace& place);
+  [[nodiscard]] const Chunk& unpacked(const BagPlace& place);
 
   std::filesystem::path path_;
   sqlite3* database_ = nullptr;
   sqlite3_blob* blob_ = nullptr;  // of row blob_row_
   std::uint64_t blob_row_ = 0;    // 0: none
+  Chunk unpacked_;                // content of row unpacked_row_
+  std::uint64_t unpacked_row_ = 0;
 };
 
 }  // namespace farpoint::tools

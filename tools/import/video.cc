@@ -82,9 +82,9 @@ Arguments probe_arguments(const fs::path& file) {
 
 Arguments decoder_arguments(const fs::path& file) {
   Arguments arguments = begin_of("ffmpeg", "file,pipe", file);
-  arguments.insert(arguments.end(),
-                   {"-nostdin", "-noautorotate", "-i", address_of(file), "-map", "0:v:0", "-fps_mode",
-                    "passthrough", "-f", "rawvideo", "-pix_fmt", "gray", "pipe:1"});
+  arguments.insert(arguments.end(), {"-nostdin", "-noautorotate", "-i", address_of(file), "-map", "0:v:0",
+                                     "-vf", "scale=out_range=full", "-fps_mode", "passthrough", "-f",
+                                     "rawvideo", "-pix_fmt", "gray", "pipe:1"});
   return arguments;
 }
 

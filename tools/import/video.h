@@ -12,8 +12,9 @@
 namespace farpoint::tools {
 
 // Times are the video's own, or frame i is at i / rate_hz where rate_hz is not 0, which a raw MJPEG stream
-// needs. Frames are not turned, whatever the file says of its orientation. Throws InputError, also where
-// ffprobe is not installed.
+// needs. Luma of limited range (16 to 235) becomes 0 to 255; grey video keeps its levels, since encoders name
+// a range for it that it does not have. Frames are not turned, whatever the file says of its orientation.
+// Throws InputError, also where ffprobe is not installed.
 [[nodiscard]] Recording read_video(const std::filesystem::path& file,
                                    const std::filesystem::path& camera_file, double rate_hz);
 

@@ -45,6 +45,7 @@ const std::array kFaults = {Fault{"frames dropped", &status_t::frames_dropped},
                             Fault{"IMU invalid", &status_t::imu_invalid},
                             Fault{"CAN send", &status_t::can_send_errors},
                             Fault{"LCM send", &status_t::lcm_send_errors},
+                            Fault{"MAVLink send", &status_t::mavlink_send_errors},
                             Fault{"log write", &status_t::log_write_errors},
                             Fault{"not recorded", &status_t::images_not_recorded},
                             Fault{"lost", &status_t::times_lost}};

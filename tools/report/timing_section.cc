@@ -83,7 +83,7 @@ std::vector<Eigen::Vector2d> tracking_points(const RunRecord& run) {
   return points;
 }
 
-// Steps a run over one axis of times, nearly to the longest one. `label`: of a run with its times.
+// One line of steps a run; the axis ends near the longest time. `label`: text of a run, from its times.
 template <typename Times, typename Label>
 std::string time_histogram(const Runs& runs, const char* title, const char* axis, Times&& times_of,
                            Label&& label) {
@@ -241,8 +241,9 @@ std::string timing_section(const Runs& runs) {
   return section(
       "Timing",
       "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed to the "
-      "output; mapping works beside it in a threaded run, whose messages have no time of mapping or its "
-      "stages: 'mapping and rest' is the CPU time of the process without decoding, tracking and output.",
+      "output. In a threaded run mapping works beside it: its stages are of one keyframe as a rule, of those "
+      "that were done since the frame before; 'mapping and rest' is the CPU time of the process without "
+      "decoding, tracking and output.",
       row_of({histogram, tracking_over_time(runs), latency_histogram(runs), load_over_time(runs), bars}));
 }
 

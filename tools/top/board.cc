@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "ipc/reason.h"
 #include "slam/frame_result.h"
 #include "tools/evaluate/own_metrics.h"
 
@@ -42,33 +43,12 @@ std::string missing_functions(std::int32_t bits) {
                                  Name{status_t::SIDE_LIVE_TRAJECTORY, "trajectory"},
                                  Name{status_t::SIDE_CAN_LOG, "CAN log"},
                                  Name{status_t::SIDE_RECORDING, "recording"},
-                                 Name{status_t::SIDE_LOG_FILE, "log file"}};
+                                 Name{status_t::SIDE_LOG_FILE, "log file"},
+                                 Name{status_t::SIDE_MAVLINK, "MAVLink"}};
   std::string text;
   for (const Name& name : kNames)
     if ((bits & name.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name.text);
   return text;
-}
-
-// Why a state gives no valid pose, in the words of the CAN signal Reason.
-const char* reason_of(int state) {
-  switch (state) {
-    case status_t::STATE_STARTING:
-      return "no image yet";
-    case status_t::STATE_INITIALISING:
-      return "map not started: it needs two views with parallax and many matches";
-    case status_t::STATE_SETTLING:
-      return "the young map's scale is settling";
-    case status_t::STATE_DEGRADED:
-      return "few landmarks";
-    case status_t::STATE_LOST:
-      return "tracking lost";
-    case status_t::STATE_RELOCALISING:
-      return "place not recognised yet";
-    case status_t::STATE_NO_CAMERA:
-      return "no camera: none answers, or it is silent";
-    default:
-      return "";
-  }
 }
 
 // Root of the trace of one 3x3 block: the size of the error; a dash where it is unknown.
@@ -183,8 +163,10 @@ std::string Board::state_lines(double now_s, bool colour) const {
 
 std::string Board::reason(double now_s) const {
   if (!status_->message.empty()) return status_->message;
-  const std::string by_state = reason_of(status_->state);
-  if (!by_state.empty()) return by_state;
+  std::array<char, ipc::kReasonText> buffer;
+  const std::string_view text = ipc::reason_text(static_cast<ipc::Reason>(status_->reason),
+                                                 status_->reason_value, status_->reason_wanted, buffer);
+  if (!text.empty()) return std::string(text);
   if (!odometry_) return "no odometry received";
   const double age_s = now_s - odometry_s_;
   return age_s > kInTime_s ? fmt::format("no pose in time: the last odometry came {:.1f} s ago", age_s) : "";
@@ -245,6 +227,19 @@ double Board::cpu_percent() const {
   return passed_s > 0.0 ? 100.0 * used_s / passed_s : NAN;
 }
 
+std::string Board::camera_line() const {
+  const status_t& s = *status_;
+  if (s.camera.empty()) return "";
+  std::string text = "camera    " + s.camera;
+  if (!s.camera_format.empty()) text += "   " + s.camera_format;
+  if (s.camera_rate_hz > 0.0) text += fmt::format(" at {:.4g} Hz", s.camera_rate_hz);
+  text += s.camera_exposure_us >= 0
+              ? fmt::format("   exposure {:.3g} ms", 1e-3 * static_cast<double>(s.camera_exposure_us))
+              : "   exposure unknown";
+  if (s.camera_gain >= 0.0) text += fmt::format("   gain {:.3g}", s.camera_gain);
+  return text + "\n";
+}
+
 std::string Board::count_lines() const {
   const status_t& s = *status_;
   std::string text;
@@ -252,10 +247,11 @@ std::string Board::count_lines() const {
       "queues    capture {} (most {})   mapping {} ({})   publish {} ({})   features a frame {}\n",
       s.capture_queue, s.capture_queue_max, s.mapping_queue, s.mapping_queue_max, s.publish_queue,
       s.publish_queue_max, s.features_asked);
-  text += fmt::format(
-      "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
-      s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
-      s.camera_losses);
+  text += camera_line();
+  text +=
+      fmt::format("images    {} in   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
+                  s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged,
+                  s.images_undecodable, s.camera_losses);
   if (s.stereo_pairs > 0 || s.stereo_left_alone > 0 || s.stereo_right_alone > 0) {
     text +=
         fmt::format("stereo    {} pairs   {} left alone   {} right alone   skew {:.1f} ms\n", s.stereo_pairs,
@@ -276,6 +272,13 @@ std::string Board::fault_lines() const {
   if (bus != "off")
     text += fmt::format("   {} not sent   {} bus-offs   {} received", s.can_send_errors, s.can_bus_offs,
                         s.can_received);
+  if (s.mavlink_sent + s.mavlink_without_scale + s.mavlink_without_pose > 0) {
+    const std::string answered =
+        s.mavlink_round_trip_us < 0 ? "no answer" : fmt::format("round trip {} us", s.mavlink_round_trip_us);
+    text += fmt::format("\nMAVLink   {} sent   {} without metres   {} without pose   {} errors   {}",
+                        s.mavlink_sent, s.mavlink_without_scale, s.mavlink_without_pose,
+                        s.mavlink_send_errors, answered);
+  }
   text += fmt::format(
       "\nerrors    {} LCM   {} log   {} not recorded   {} times backwards   {} stamps of no clock\n",
       s.lcm_send_errors, s.log_write_errors, s.images_not_recorded, s.times_backwards, s.times_unknown);

@@ -158,14 +158,24 @@ TEST(DroppedKeys, NoneIsAKeyOfThisVersionAndEachHeirIs) {
   }
 }
 
+TEST(ConfigMistakes, AMavlinkLinkThatIsNoneIsRefusedWithItsPlace) {
+  const std::string expected =
+      ", expected udp:ADDRESS:PORT, udp:ADDRESS:PORT:LOCAL_PORT (IPv4 numbers) or serial:DEVICE:BAUD, like "
+      "serial:/dev/ttyS1:921600";
+  EXPECT_EQ(error_of("mavlink:\n  link: tcp:127.0.0.1:5760\n"),
+            "f.yaml:2: mavlink.link: 'tcp:127.0.0.1:5760'" + expected);
+  EXPECT_EQ(error_of_setting("mavlink.link=serial:/dev/ttyS1"),
+            "--set: mavlink.link: 'serial:/dev/ttyS1'" + expected);
+  EXPECT_EQ(error_of("mavlink:\n  link: udp:10.1.2.3:14550:14540\n"), "");
+}
+
 TEST(ConfigMistakes, UnknownKeySaysFileLineAndTheNearestKey) {
   EXPECT_EQ(error_of("log:\n  level: info\ntracking:\n  min_inlier: 30\n"),
             "f.yaml:4: tracking.min_inlier: unknown key, did you mean 'tracking.min_inliers'?");
   EXPECT_EQ(error_of("traking:\n  min_inliers: 30\n"),
             "f.yaml:1: traking: unknown key, did you mean 'tracking'?");
-  EXPECT_EQ(
-      error_of("tracking:\n  max_interval_frames: 3\n"),
-      "f.yaml:2: tracking.max_interval_frames: unknown key, did you mean 'keyframes.max_interval_frames'?");
+  EXPECT_EQ(error_of("tracking:\n  max_interval_s: 3\n"),
+            "f.yaml:2: tracking.max_interval_s: unknown key, did you mean 'keyframes.max_interval_s'?");
   EXPECT_EQ(error_of("zzzzzzzzzz: 1\n"),
             "f.yaml:1: zzzzzzzzzz: unknown key, expected a key of config/farpoint.yaml");
 }

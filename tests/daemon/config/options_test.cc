@@ -70,6 +70,22 @@ TEST(CommandLine, ThreadsAndTheirRepetition) {
   EXPECT_FALSE(parse({"--replay", "run.lcm", "--speed", "2", "--schedule", "recorded"}).options.speed);
 }
 
+TEST(CommandLine, AReplayAloneRunsAsOnTheVehicle) {
+  EXPECT_EQ(parse({"--replay", "run.lcm"}).options.speed, 1.0);
+  EXPECT_FALSE(parse({"--replay", "run.lcm", "--lockstep"}).options.speed);
+  EXPECT_FALSE(parse({"--replay", "run.lcm", "--schedule", "recorded"}).options.speed);
+  EXPECT_FALSE(parse({}).options.speed);
+}
+
+TEST(CommandLine, ChecksInsteadOfARun) {
+  EXPECT_FALSE(parse({}).options.check);
+  const Options o = parse({"--check", "--json", "--config", "c.yaml", "--record", "run.lcm"}).options;
+  EXPECT_TRUE(o.check && o.json);
+  EXPECT_EQ(parse({"--check", "--replay", "run.lcm"}).options.replay, "run.lcm");
+  EXPECT_EQ(error_of({"--check", "--replay", "-"}), "--check --replay -: expected a log that is a file");
+  EXPECT_EQ(error_of({"--json"}), "--json without --check, expected both");
+}
+
 TEST(CommandLine, WithoutAReplayItRunsLive) {
   EXPECT_EQ(parse({}).options.replay, "");
   const Options o = parse({"--record", "run.lcm", "--output", "out.lcm"}).options;
@@ -80,7 +96,7 @@ TEST(CommandLine, WithoutAReplayItRunsLive) {
 TEST(CommandLine, HelpTeaches) {
   const std::string help = parse({"--help"}).text_and_leave;
   for (const char* word :
-       {"--config", "--replay", "--lockstep", "--speed", "--schedule", "--output", "--trajectory",
+       {"--config", "--check", "--replay", "--lockstep", "--speed", "--schedule", "--output", "--trajectory",
         "--live-trajectory", "--can-log", "--lcm-url", "--can", "--set", "Exit status", "Examples"}) {
     EXPECT_NE(help.find(word), std::string::npos) << word;
   }
@@ -88,8 +104,6 @@ TEST(CommandLine, HelpTeaches) {
 }
 
 TEST(CommandLineMistakes, SayWhatWasExpectedInOneLine) {
-  EXPECT_EQ(error_of({"--replay", "run.lcm"}),
-            "--lockstep, --speed X or --schedule recorded is missing beside --replay, expected one of them");
   for (const auto& wrong : {error_of({"--lockstep"}), error_of({"--speed", "1"}),
                             error_of({"--schedule", "recorded"}), error_of({"--schedule-log", "a.lcm"})}) {
     EXPECT_EQ(wrong, "--lockstep, --speed and --schedule are of a replay, expected --replay LOG with them");

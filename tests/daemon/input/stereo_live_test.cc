@@ -7,6 +7,7 @@
 
 #include "daemon/config/camera_file.h"
 #include "daemon/config/errors.h"
+#include "daemon/input/live_camera_options.h"
 #include "daemon/replay.h"
 #include "ipc/channels.h"
 #include "tests/daemon/live_fixture.h"
@@ -119,6 +120,7 @@ TEST_F(StereoLive, BothCamerasAreRecordedAndTheLogReplaysToTheSamePoses) {
   again.replay = options_.record;
   again.schedule_log = options_.output;
   again.live_trajectory = scratch_.path("again.tum");
+  config_.camera.use = CameraUse::kOne;  // as the live run
   testing::internal::CaptureStdout();
   ASSERT_EQ(replay(again, config_), 0);
   testing::internal::GetCapturedStdout();

@@ -37,7 +37,7 @@ EpochPredictor with(const FrameOutput& frame, double period_s = 0.1) {
 TEST(EpochPredictor, BeforeTheFirstImageItSaysThatItIsStarting) {
   const ipc::OdometryEpoch e = EpochPredictor(EpochOptions{}).at(kImage_us);
   EXPECT_EQ(e.state, int{status_t::STATE_STARTING});
-  EXPECT_EQ(e.reason, ipc::CanReason::kNoImageYet);
+  EXPECT_EQ(e.reason, ipc::Reason::kNoImageYet);
   EXPECT_TRUE(std::isnan(e.age_s));
   EXPECT_FALSE(e.pose_valid || e.velocity_valid || e.from_vision || e.predicted);
 }
@@ -72,7 +72,7 @@ TEST(EpochPredictor, AQuarterOfASecondAfterTheImageNothingIsValid) {
   const ipc::OdometryEpoch e = predictor.at(kImage_us + 250'001);
   EXPECT_FALSE(e.pose_valid || e.velocity_valid || e.from_vision);
   EXPECT_EQ(e.state, int{status_t::STATE_LOST});  // not 'tracking' any more, whichever thread hangs
-  EXPECT_EQ(e.reason, ipc::CanReason::kNoPoseInTime);
+  EXPECT_EQ(e.reason, ipc::Reason::kNoPoseInTime);
   EXPECT_EQ(e.quality, -1);
 }
 
@@ -83,7 +83,7 @@ TEST(EpochPredictor, ACameraThatIsAwayMakesNoImageYounger) {
   predictor.take(silence, kImage_us + 400'000);
   const ipc::OdometryEpoch e = predictor.at(kImage_us + 420'000);
   EXPECT_EQ(e.state, int{status_t::STATE_NO_CAMERA});
-  EXPECT_EQ(e.reason, ipc::CanReason::kNoCamera);
+  EXPECT_EQ(e.reason, ipc::Reason::kNoCamera);
   EXPECT_NEAR(e.age_s, 0.42, 1e-9);
 }
 
@@ -97,13 +97,13 @@ TEST(EpochPredictor, ThePeriodIsMeasuredAndAGapIsNone) {
 }
 
 TEST(EpochPredictor, EachStateHasItsReason) {
-  const std::map<slam::State, ipc::CanReason> reasons{
-      {slam::State::kInitialising, ipc::CanReason::kMapNotStarted},
-      {slam::State::kSettling, ipc::CanReason::kMapSettling},
-      {slam::State::kTracking, ipc::CanReason::kNone},
-      {slam::State::kDegraded, ipc::CanReason::kFewLandmarks},
-      {slam::State::kLost, ipc::CanReason::kTrackingLost},
-      {slam::State::kRelocalising, ipc::CanReason::kPlaceNotRecognised}};
+  const std::map<slam::State, ipc::Reason> reasons{
+      {slam::State::kInitialising, ipc::Reason::kMapNotStarted},
+      {slam::State::kSettling, ipc::Reason::kMapSettling},
+      {slam::State::kTracking, ipc::Reason::kNone},
+      {slam::State::kDegraded, ipc::Reason::kFewLandmarks},
+      {slam::State::kLost, ipc::Reason::kTrackingLost},
+      {slam::State::kRelocalising, ipc::Reason::kPlaceNotRecognised}};
   for (const auto& [state, reason] : reasons) {
     slam::FrameResult r = tracked().result;
     r.state = state;
@@ -111,10 +111,10 @@ TEST(EpochPredictor, EachStateHasItsReason) {
   }
   slam::FrameResult wild = tracked().result;
   wild.T_odom_body.t.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(with(make_frame_output(wild, 0.0)).at(kImage_us).reason, ipc::CanReason::kNumberOutOfRange);
+  EXPECT_EQ(with(make_frame_output(wild, 0.0)).at(kImage_us).reason, ipc::Reason::kNumberOutOfRange);
   FrameOutput contradicted = tracked();
   contradicted.calibration_contradicted = true;
-  EXPECT_EQ(with(contradicted).at(kImage_us).reason, ipc::CanReason::kCalibrationContradicted);
+  EXPECT_EQ(with(contradicted).at(kImage_us).reason, ipc::Reason::kCalibrationContradicted);
 }
 
 TEST(EpochPredictor, NoStandardDeviationIsClaimed) {
@@ -127,7 +127,7 @@ TEST(EpochPredictor, NoStandardDeviationIsClaimed) {
 TEST(EpochPredictor, TheFarewellGivesNoNumber) {
   const ipc::OdometryEpoch e = with(tracked()).farewell(kImage_us + 10'000);
   EXPECT_EQ(e.state, int{status_t::STATE_STOPPED});
-  EXPECT_EQ(e.reason, ipc::CanReason::kStopped);
+  EXPECT_EQ(e.reason, ipc::Reason::kStopped);
   EXPECT_FALSE(e.pose_valid || e.velocity_valid || e.from_vision);
   EXPECT_TRUE(std::isnan(e.age_s));
   EXPECT_EQ(e.quality, -1);

@@ -5,6 +5,7 @@
 
 #include "daemon/system/side_functions.h"
 #include "ipc/channels.h"
+#include "ipc/reason.h"
 #include "tests/daemon/output/published.h"
 
 namespace farpoint::daemon {
@@ -46,6 +47,23 @@ class FrameReporterTest : public ::testing::Test {
       config_, {"build", "config", "calibration"}, {&first_, &second_}, &publisher_, &maps_, 4321, true};
 };
 
+TEST_F(FrameReporterTest, TheStatusDescribesTheCameraOfALiveRun) {
+  report(package(0, 0, 0));
+  status_t s = kept_.of<status_t>(ipc::kStatusChannel).back();
+  EXPECT_EQ(s.camera + s.camera_format, "") << "a replay";
+  EXPECT_EQ(s.camera_exposure_us, -1);
+  reporter_.set_camera("usb:1-1");
+  FramePackage next = package(20, 0, 0);
+  next.camera = {drivers::CameraFormat::kYuyv, 29.97, 4500, 12.0F};
+  report(next);
+  s = kept_.of<status_t>(ipc::kStatusChannel).back();
+  EXPECT_EQ(s.camera, "usb:1-1");
+  EXPECT_EQ(s.camera_format, "YUYV");
+  EXPECT_EQ(s.camera_rate_hz, 29.97);
+  EXPECT_EQ(s.camera_exposure_us, 4500);
+  EXPECT_EQ(s.camera_gain, 12.0);
+}
+
 TEST_F(FrameReporterTest, HandsEachFrameOnceToEverySinkAndThePublisher) {
   for (int i = 0; i < 5; ++i) report(package(i, i, i));
   for (const test::KeptFrames* sink : {&first_, &second_}) {
@@ -73,6 +91,19 @@ TEST_F(FrameReporterTest, TheStatusComesAtItsRateAndAtEachChangeOfState) {
   EXPECT_EQ(status[1].frames_valid, 10);
   EXPECT_EQ(status[1].memory_pool_bytes, 4321);
   EXPECT_EQ(status[1].build, "build");
+}
+
+TEST_F(FrameReporterTest, TheStatusSaysWhyNoPoseIsValid) {
+  FramePackage p = package(0, 0, 0);
+  p.result.state = slam::State::kInitialising;
+  p.result.refusal = {slam::Reason::kLittleParallax, 0.004, 0.0175};
+  report(p);
+  const auto status = kept_.of<status_t>(ipc::kStatusChannel);
+  ASSERT_EQ(status.size(), 1U);
+  EXPECT_EQ(status[0].reason, static_cast<int>(ipc::Reason::kLittleParallax));
+  EXPECT_EQ(status[0].reason_value, 0.004);
+  EXPECT_EQ(status[0].reason_wanted, 0.0175);
+  EXPECT_EQ(status[0].message, "waiting for sideways motion: 0.0040 of 0.0175 rad");
 }
 
 TEST_F(FrameReporterTest, TheStatusHasTheCountsOfEstimatorMappingAndInput) {

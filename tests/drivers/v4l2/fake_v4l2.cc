@@ -87,6 +87,10 @@ std::unique_ptr<drivers::CameraDevice> FakeV4l2::make_device(drivers::CameraOpti
   return std::make_unique<drivers::V4l2Device>(options, std::make_unique<System>(this));
 }
 
+std::unique_ptr<drivers::V4l2System> FakeV4l2::make_system() {
+  return std::make_unique<System>(this);
+}
+
 void FakeV4l2::give_exposure_and_gain() {
   gain_min = 0;
   gain_max = 100;

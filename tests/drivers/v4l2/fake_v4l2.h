@@ -20,6 +20,8 @@ class FakeV4l2 final : public FakeCamera {
  public:
   FakeV4l2();
   [[nodiscard]] std::unique_ptr<drivers::CameraDevice> make_device(drivers::CameraOptions options) override;
+  // The calls alone; opens /dev/null.
+  [[nodiscard]] std::unique_ptr<drivers::V4l2System> make_system();
   void give_exposure_and_gain() override;
   [[nodiscard]] bool show(const FakeShot& shot) override;
   void unplug() override;  // reported by errors

@@ -233,6 +233,9 @@ TEST_F(ImportImages, TheProgramWritesALogWithTheFilesBytes) {
   const ProgramResult stamped = run_farpoint_program(command + times);
   EXPECT_EQ(stamped.status, 0) << stamped.err;
   EXPECT_NE(stamped.out.find("read as ns (20 pictures a second)"), std::string::npos) << stamped.out;
+  // The pace is that of the stamps, whatever the camera file says.
+  put(camera(), get(camera()) + "rate_hz: 5\n");
+  EXPECT_NE(run_farpoint_program(command + times).out.find("(20 pictures a second)"), std::string::npos);
   for (const std::string& wrong : {std::string(), times + " --rate 20", times + " --unit weeks"}) {
     const ProgramResult refused = run_farpoint_program(command + wrong);
     EXPECT_EQ(refused.status, 2) << wrong;

@@ -70,6 +70,30 @@ TEST_F(ImportDb3, PixelsAreThoseOfTheMessage) {
   EXPECT_EQ(images, 3U);
 }
 
+TEST_F(ImportDb3, MessagesPackedOneByOneAreTheSame) {
+  write();
+  write_recording(read_bag(file(), {}), root_ / "run.lcm");
+  write("--packed", root_ / "packed.db3");
+  const Recording r = read_bag(root_ / "packed.db3", {});
+  EXPECT_EQ(r.imu.size(), 10U);
+  write_recording(r, root_ / "packed.lcm");
+  EXPECT_EQ(get(root_ / "packed.lcm"), get(root_ / "run.lcm"));
+}
+
+TEST_F(ImportDb3, APackedMessageThatIsDamagedHugeOrOfUnknownSizeIsRefused) {
+  const std::string image = "(SELECT max(id) FROM messages)", of_image = " WHERE id = " + image;
+  write("--packed --sql \"UPDATE messages SET data = substr(data, 1, 100)" + of_image + "\"");
+  expect_all_in(complaint_of([&] { write_recording(read_bag(file(), {}), root_ / "run.lcm"); }),
+                {"db3: message ", "a damaged message (zstd)"});
+  // A frame of one segment, with a size of 8 bytes.
+  write_sql("UPDATE messages SET data = x'28b52ffde0ffffffffffffff7f000000'" + of_image);
+  expect_all_in(complaint(),
+                {"db3: message ", "a packed message of 9223372036854775807 bytes, expected at most"});
+  // A window, and no size.
+  write_sql("UPDATE messages SET data = x'28b52ffd005800000000000000000000'" + of_image);
+  expect_all_in(complaint(), {"db3: message ", "does not name the size"});
+}
+
 TEST_F(ImportDb3, TheFilesOfAFolderAreOneRecording) {
   const fs::path folder = root_ / "drive";
   put(folder / "metadata.yaml", "rosbag2_bagfile_information: {}\n");

@@ -221,6 +221,25 @@ TEST_F(ImportVideo, TheRealProgramsGiveTheFramesThatWentIn) {
   }
 }
 
+// Cameras' H.264 has luma of 16 to 235.
+TEST_F(ImportVideo, TheRealProgramsWidenLimitedRangeAndKeepFullRange) {
+  if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";
+  const std::string raw = (root_ / "raw").string();
+  put(raw, std::string(64 * 24, '\x10') + std::string(64 * 24, '\xeb') + std::string(64 * 24, '\x80'));
+  fs::remove_all(root_ / "bin");
+  for (const auto& [range, black, white] : {std::tuple{"tv", 0, 255}, {"pc", 16, 235}}) {
+    const ProgramResult made = run_shell(
+        "ffmpeg -v error -y -f rawvideo -pix_fmt yuv420p -s 64x48 -color_range " + std::string(range) +
+        " -i '" + raw + "' -c:v ffv1 -color_range " + range + " -f matroska '" + video().string() + "'");
+    ASSERT_EQ(made.status, 0) << made.err;
+    const ProgramResult done = import();
+    ASSERT_EQ(done.status, 0) << done.err;
+    const ipc::GreyImage grey = grey_of(images().at(0));
+    EXPECT_EQ(grey.pixels.front(), black) << range;
+    EXPECT_EQ(grey.pixels.back(), white) << range;
+  }
+}
+
 // ffmpeg follows the names in a playlist: the file itself would choose what is read.
 TEST_F(ImportVideo, APlaylistIsNoVideo) {
   if (run_shell("ffmpeg -version").status != 0) GTEST_SKIP() << "no ffmpeg";

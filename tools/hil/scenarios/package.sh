@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all except the last.
+# The .deb: installed, upgraded while the service runs, removed, purged; the configuration outlives all except the last, a camera file all.
 #@ form: long
 #@ machine: systemd
 #@ needs: package
@@ -26,8 +26,11 @@ dpkg -r farpoint > /tmp/dpkg.log 2>&1 || fail "removal: $(tail -1 /tmp/dpkg.log)
 ! has_lcm_route || fail "the removal left LCM's route"
 grep -q "features: 300" /etc/farpoint/farpoint.yaml || fail "the removal took the configuration"
 [ -e /etc/farpoint/camera.yaml ] || fail "the removal took the camera file"
+[ -s /var/lib/farpoint/boot_counter ] || fail "the removal took the boot counter"
 dpkg -P farpoint > /tmp/dpkg.log 2>&1 || fail "purge: $(tail -1 /tmp/dpkg.log)"
-remains=$(ls -d /etc/farpoint /var/lib/farpoint /var/log/farpoint 2> /dev/null)
-[ -z "$remains" ] || fail "the purge left $remains"
+[ -e /etc/farpoint/camera.yaml ] || fail "the purge took the camera file"
+for gone in /etc/farpoint/farpoint.yaml /var/lib/farpoint/boot_counter; do
+  [ ! -e "$gone" ] || fail "the purge left $gone"
+done
 [ -z "$(systemctl --failed --no-legend | grep farpoint)" ] || fail "a failed unit is left"
-figure "removed with the configuration kept, purged with nothing left"
+figure "removed with the configuration kept, purged with the camera file kept"
