@@ -146,7 +146,7 @@ struct Place {
 Place place_of(std::size_t number) {
   std::size_t all = 0;
   for (const Layout& layout : layouts()) all += layout.files.size();
-  number %= all;
+  number %= std::max<std::size_t>(all, 1);
   Place place;
   while (number >= layouts()[place.layout].files.size()) number -= layouts()[place.layout++].files.size();
   place.file = number;

@@ -34,8 +34,9 @@ Places places_of(const RunRecord& run) {
 
 std::vector<Eigen::Vector2d> way_of(const RunRecord& run) {
   std::vector<Eigen::Vector2d> way;
+  way.reserve(run.run.final_trajectory.poses.size());
   for (const TimedPose& p : run.run.final_trajectory.poses)
-    way.push_back((run.world_from_map() * p.pose.t).head<2>());
+    way.emplace_back((run.world_from_map() * p.pose.t).head<2>());
   return way;
 }
 

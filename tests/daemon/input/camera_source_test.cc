@@ -171,6 +171,7 @@ TEST(CameraSource, EveryImageOfAFurtherCameraIsReportedAndRecordedOnceWhileTheFi
 
 TEST(CameraSource, ThreeCamerasAreCountedTogether) {
   std::vector<std::unique_ptr<FastCamera>> owned;
+  owned.reserve(3);
   for (int i = 0; i < 3; ++i) owned.push_back(std::make_unique<FastCamera>());
   CameraSource first(0, std::move(owned[0])), second(1, std::move(owned[1])), third(2, std::move(owned[2]));
   first.pair_with(&second, kPeriod_us / 4);
