@@ -25,8 +25,6 @@
 namespace farpoint::daemon {
 namespace {
 
-constexpr double kRateTolerance = 0.98;
-
 // One camera that is looked at.
 struct Looked {
   const drivers::CameraOptions& options;
@@ -61,7 +59,7 @@ void check_v4l2(const Looked& camera, const std::string& root) {
                                         o.height_px, to_string(look.offered.format));
   const double fastest = look.offered.fastest_hz;
   if (fastest <= 0.0) return camera.ok(offer + ", at a rate that the driver does not list");
-  if (o.rate_hz > 0.0 && fastest < kRateTolerance * o.rate_hz)
+  if (!look.offered.reaches(o.rate_hz))
     return camera.warn(fmt::format("{} at no more than {:.4g} Hz, expected {:.4g} Hz (camera.rate_hz)", offer,
                                    fastest, o.rate_hz));
   camera.ok(fmt::format("{} at up to {:.4g} Hz", offer, fastest));

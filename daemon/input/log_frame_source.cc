@@ -97,7 +97,6 @@ bool LogFrameSource::may_give() {
 }
 
 void LogFrameSource::give(SourceFrame* frame) {
-  forget_past_seconds();
   *frame = {firsts_.front(), &image_, nullptr};
   firsts_.pop(&image_);
   if (!seconds_.empty() && seconds_.front().utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {

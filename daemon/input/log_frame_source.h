@@ -50,6 +50,7 @@ class LogFrameSource final : public FrameSource {
   void decode(const drivers::LogItem& item, StageClock* clock, WaitingImages* out);
   void forget_past_seconds();
   [[nodiscard]] bool may_give();
+  // Precondition: may_give() was the last call and an image of the first camera waits.
   void give(SourceFrame* frame);
   void take_calibration(const calibration_t& calibration);
   void reserve_waiting();
