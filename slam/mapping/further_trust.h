@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much the further cameras' measurements count beside the first camera's.
 //
-// A camera that moves against the rig (a mount that bends, an exposure at another time) has an error that all
-// its measurements of one keyframe share: a field in their residuals. N of them then know no more than one
-// measurement with the field's size as its error, and their sigmas grow by sqrt(1 + N field^2 / sigma^2). So
-// the first camera keeps the map's shape, and the pair holds its unit by the average of many keyframes. Seen
-// on a recording of a car whose second camera turns by 4 px in a second.
+// A camera may move against the rig: a mount bends, an exposure is late. All its measurements of a keyframe
+// then share an error, seen as a field in their residuals. N of them weigh as one measurement of the field's
+// size: their sigmas grow by sqrt(1 + N field^2 / sigma^2). The first camera then determines the map's shape,
+// and the pair its unit, averaged over many keyframes. Source: a recording of a car whose second camera turns
+// by 4 px in a second.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace farpoint::slam {
 
 class FurtherTrust {
  public:
-  // A new map: nothing speaks against the cameras.
+  // A new map: further cameras count in full.
   void start_map() { *this = {}; }
   // Takes one adjustment, whose newest keyframe is of `utime`. Its sigmas were larger by sigma_factor().
   void note_adjustment(const Soundness& soundness, std::int64_t utime);

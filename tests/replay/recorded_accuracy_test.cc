@@ -112,8 +112,8 @@ INSTANTIATE_TEST_SUITE_P(
                               "kitti {}/karlsruhe 2010_03_09_0019",
                               {"final.ate_rmse_m <= 0.5", "final.share >= 0.99", "live.share >= 0.94",
                                "live_ate <= 0.5", "resets == 1"}},
-                    // Its second camera turns on its mount, by 4 px and more: metres need it, the map's shape
-                    // must not. ORB-SLAM3 stereo 0.63 m, Basalt 0.65 m.
+                    // Its second camera turns on its mount by 4 px and more. It gives the map's unit, and
+                    // must not bend the map. Peers: ORB-SLAM3 stereo 0.63 m, Basalt 0.65 m.
                     Recording{
                         "karlsruhe",
                         "karlsruhe",
