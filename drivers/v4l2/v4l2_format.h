@@ -32,7 +32,7 @@ struct OfferedFormat {
   CameraFormat format = CameraFormat::kAuto;
   double fastest_hz = 0;  // at the options' size; 0: unknown
 
-  // Whether the driver's lists allow the rate, or say nothing of it.
+  // True where the driver's lists allow the rate, and where they hold none.
   [[nodiscard]] bool reaches(double rate_hz) const;
 };
 
