@@ -43,6 +43,8 @@ class FrameReporter {
   }
   // A valid pose in units of scale.assumed went out.
   [[nodiscard]] bool assumes_scale() const { return assumed_map_ >= 0; }
+  // Before the first frame, live: the tracked camera's name.
+  void set_camera(const std::string& name) { status_.camera = name; }
   // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.
   void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
   // Any thread.

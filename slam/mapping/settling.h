@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "slam/map/map_judgement.h"
+#include "slam/mapping/further_trust.h"
 #include "slam/mapping/soundness.h"
 
 namespace farpoint::slam {
@@ -30,6 +31,8 @@ class Settling {
   void note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
                        bool calibration_contradicted, std::int64_t utime);
 
+  // Of the further cameras' sigmas.
+  [[nodiscard]] double further_sigma_factor() const { return judgement_.further_sigma_factor; }
   [[nodiscard]] const MapJudgement& judgement() const { return judgement_; }
   // Whether map units are metres.
   [[nodiscard]] bool metric() const { return judgement_.metric; }
@@ -40,6 +43,7 @@ class Settling {
 
  private:
   Soundness soundness_;
+  FurtherTrust further_;
   MapJudgement judgement_;
   int steady_run_ = 0;
   bool has_adjustment_ = false;  // of this map
