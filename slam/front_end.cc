@@ -12,7 +12,7 @@ namespace {
 // Room for samples that wait for a frame: two seconds of a 1 kHz IMU, and of wheels at 100 Hz. Kept for
 // fusion: twice that.
 constexpr std::size_t kImuWaiting = 2048, kImuKept = 4096;
-constexpr std::size_t kWheelsWaiting = 256, kWheelsKept = 512;
+constexpr std::size_t kWheelsWaiting = 256;
 
 std::int64_t seconds_to_us(double s) {
   return static_cast<std::int64_t>(std::llround(1e6 * s));
