@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "slam/fusion/wheel_fusion.h"
 #include "slam/map/growing_memory.h"
 #include "slam/mapping/mapper.h"
 #include "slam/mapping_rings.h"
@@ -16,7 +17,9 @@ namespace farpoint::slam {
 
 class BackEnd {
  public:
-  BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings);
+  // `wheel_point_m`: where the wheels measure, from the rig's body.
+  BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
+          const Eigen::Vector3d& wheel_point_m = Eigen::Vector3d::Zero());
 
   void listen(StageListener* listener) {
     listener_ = listener;
@@ -49,6 +52,7 @@ class BackEnd {
 
   const EstimatorConfig config_;
   MappingRings& rings_;
+  WheelFusion wheels_;
   Mapper mapper_;
   Tracker poser_;
   GrowingMemory recorded_memory_;

@@ -91,7 +91,7 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
   if (!last_.valid || !in_time || !has_image_) return epoch;
 
   epoch.pose_valid = epoch.velocity_valid = true;
-  epoch.from_vision = r.has_pose && age_us <= frame_period_us();
+  epoch.from_vision = r.has_pose && r.from_vision && age_us <= frame_period_us();
   epoch.predicted = age_us > 0;
   epoch.quality = r.quality;
   set_pose(extrapolate(last_, epoch.age_s), &epoch);

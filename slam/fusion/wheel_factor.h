@@ -4,7 +4,8 @@
 // Residual, 3x1, whitened by the motion's covariance C = L L':
 //     r = L^-1 ( [s R_a' (t_b - t_a) + (R_a' R_b - I) p]_xy - k d,  Log(R_a' R_b)_z - yaw )
 // with d and yaw the wheels' motion, p where on the body they measure it, s the scale of the map (metres a
-// unit) and k the wheel factor (metres a metre of the wheels). Height, roll and pitch stay free: the road is not a plane.
+// unit) and k the wheel factor (metres a metre of the wheels). Height, roll and pitch stay free: the road is
+// not a plane.
 #pragma once
 
 #include <array>

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The wheels in the map: their motion between keyframes, held against the images' motion, as factors of local
-// bundle adjustment. Where one camera makes the map, they give its metre; where two do, they are judged by it.
+// bundle adjustment. Where one camera makes the map, they give its metre; where two do, they are judged by
+// it.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "slam/config.h"
@@ -58,12 +60,15 @@ class WheelFusion final : public MotionFactors {
 
   void fill_links(Map* map, KeyframeHandle newest);
   [[nodiscard]] std::optional<WheelMotion> motion_of(const ChainLink& link) const;
-  void compare(Map* map, KeyframeHandle newest, double metres_per_unit);
-  void add_comparison(const Map& map, KeyframeHandle from, KeyframeHandle to, double metres_per_unit,
-                      ChainLink* link);
+  void compare(Map* map, KeyframeHandle newest);
+  void add_comparison(const SE3& T_world_a, const SE3& T_world_b, ChainLink* link);
+  void note_turn(const WheelMotion& wheels, double turn_rad);
+  [[nodiscard]] bool turns_otherwise() const;
+  // Whether the interval agrees with a ratio of this sigma.
+  [[nodiscard]] bool agrees(const Comparison& c, double log_ratio, double sigma) const;
+  [[nodiscard]] double median();
   [[nodiscard]] std::optional<Consensus> consensus();
   void mark_slips(const Consensus& consensus);
-  [[nodiscard]] bool turns_otherwise() const;
   void judge_factor(const Consensus& consensus, MotionVerdict* verdict) const;
   void judge_unit(const Consensus& consensus, const MapJudgement& judgement, MotionVerdict* verdict) const;
 

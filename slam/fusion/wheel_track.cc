@@ -148,7 +148,8 @@ std::optional<WheelSample> WheelTrack::fastest(std::int64_t from_utime, std::int
   WheelSample fastest{.utime = to_utime};
   for (std::size_t i = first_after(from_utime); i < size_ && sample(i).utime <= to_utime; ++i) {
     fastest.speed_m_per_s = std::max(fastest.speed_m_per_s, std::fabs(sample(i).speed_m_per_s));
-    fastest.yaw_rate_rad_per_s = std::max(fastest.yaw_rate_rad_per_s, std::fabs(sample(i).yaw_rate_rad_per_s));
+    fastest.yaw_rate_rad_per_s =
+        std::max(fastest.yaw_rate_rad_per_s, std::fabs(sample(i).yaw_rate_rad_per_s));
   }
   return fastest;
 }

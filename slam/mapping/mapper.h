@@ -24,6 +24,7 @@
 #include "slam/mapping/settling.h"
 #include "slam/mapping/view_builder.h"
 #include "slam/mapping/window.h"
+#include "slam/solver/motion_factors.h"
 #include "slam/solver/schur_solver.h"
 #include "slam/stages.h"
 
@@ -38,6 +39,9 @@ class Mapper {
 
   // The listener must outlive this; null ends listening.
   void listen(StageListener* listener) { listener_ = listener; }
+
+  // Motion between keyframes by another sensor, which must outlive this; null: none.
+  void use_motion(MotionFactors* motion) { motion_ = motion; }
 
   // Starts a new map from two views. Null where too few points survive adjustment; the map is then discarded.
   // From one frame that two cameras show, where the pair has no second: such a map is metric.
@@ -75,6 +79,9 @@ class Mapper {
   void count_virtual_points();
   // Local bundle adjustment. False where nothing was optimised or the solution is unusable.
   bool optimise(KeyframeHandle centre, int iterations);
+  void judge_motion(KeyframeHandle newest);
+  // The unit is the metre by the cameras' own baseline.
+  [[nodiscard]] bool metric_by_rig() const { return rig_calibrator_.has_value() && settling_.metric(); }
   void refine_calibration();
   void refine_rig();
   void forget(KeyframeHandle newest);
@@ -96,6 +103,7 @@ class Mapper {
   Calibrator calibrator_;
   std::optional<RigCalibrator> rig_calibrator_;  // of two cameras
   ViewBuilder view_builder_;
+  MotionFactors* motion_ = nullptr;
   StageListener* listener_ = nullptr;
 };
 
