@@ -58,7 +58,7 @@ struct Sample {
   double time_s = 0, speed_mps = 0, yaw_rate_radps = 0;
 };
 
-// Wheels of KITTI 03 from its poses: 50 Hz, one percent too fast, 2 cm/s of noise, three slips of 3 s, a gap
+// Wheels of KITTI 03 from its poses: 50 Hz, one percent too fast, 2 cm/s of noise, three spins of 3 s, a gap
 // of 1 s.
 class WheelsOfTruth {
  public:
@@ -94,7 +94,7 @@ class WheelsOfTruth {
   }
   static double slip(double t) {
     if (t > 8.0 && t < 11.0) return 1.12;
-    if (t > 20.0 && t < 23.0) return 0.9;
+    if (t > 20.0 && t < 23.0) return 1.25;
     return t > 32.0 && t < 35.0 ? 1.2 : 1.0;
   }
   // Rates between frames hold in their middle, and are interpolated.
