@@ -6,10 +6,11 @@
 namespace farpoint::slam {
 
 BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
-                 const Eigen::Vector3d& wheel_point_m)
+                 const VehiclePoints& points)
     : config_(config),
+      points_(points),
       rings_(*rings),
-      wheels_(config.wheels, wheel_point_m,
+      wheels_(config.wheels, points.wheels_m,
               rig.cameras.size() > 1 ? MetreSource::kCameras : MetreSource::kWheels),
       mapper_(config, rig),
       poser_(config, static_cast<int>(rig.cameras.size())) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "slam/fusion/wheel_fusion.h"
+#include "slam/fusion/wheel_motion_model.h"
 #include "slam/map/growing_memory.h"
 #include "slam/mapping/mapper.h"
 #include "slam/mapping_rings.h"
@@ -17,9 +18,8 @@ namespace farpoint::slam {
 
 class BackEnd {
  public:
-  // `wheel_point_m`: where the wheels measure, from the rig's body.
   BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
-          const Eigen::Vector3d& wheel_point_m = Eigen::Vector3d::Zero());
+          const VehiclePoints& points = {});
 
   void listen(StageListener* listener) {
     listener_ = listener;
@@ -38,6 +38,8 @@ class BackEnd {
   void transform_map(std::int32_t map_id, const Sim3& S_new_old) { mapper_.transform_map(map_id, S_new_old); }
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
+  // From the map's body to the calibration's.
+  [[nodiscard]] const Eigen::Vector3d& body_point_m() const { return points_.body_m; }
   // Empty without capacity.whole_trajectory.
   [[nodiscard]] const std::pmr::deque<KeptFrame>& recorded() const { return recorded_; }
   // Work space of the tracker that poses frames from before the map.
@@ -51,6 +53,7 @@ class BackEnd {
   void discard_map(std::int32_t map_id);
 
   const EstimatorConfig config_;
+  const VehiclePoints points_;
   MappingRings& rings_;
   WheelFusion wheels_;
   Mapper mapper_;

@@ -33,8 +33,9 @@ int quality_of(const TrackOutcome& outcome) {
 }  // namespace
 
 FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
-                   const Eigen::Vector3d& wheel_point_m)
+                   const VehiclePoints& points)
     : config_(config),
+      points_(points),
       intake_(config, rig, static_cast<int>(rig.cameras.size())),
       initialiser_(config, rig),
       tracker_(config, static_cast<int>(rig.cameras.size())),
@@ -43,7 +44,7 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       repeated_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept),
-      wheel_motion_(config.wheels, wheel_point_m) {
+      wheel_motion_(config.wheels, points.wheels_m) {
   tracker_.use_motion_model(&wheel_prior_);
   waiting_.reserve(2 * Initialiser::kHistoryFrames);
 }
@@ -107,6 +108,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   else
     result_.refusal = refusal_of(*frame, blind && !held);
   result_.jobs_under_way = static_cast<int>(port_.jobs_under_way());
+  place_body();
   return result_;
 }
 
@@ -539,6 +541,18 @@ void FrontEnd::fill_map_state() {
   result_.state = state_;
   result_.map_id = map_id_;
   result_.reset_counter = odometry_.reset_counter();
+}
+
+// Where there is a metre, the lever arm from the tracked body to the calibration's holds.
+void FrontEnd::place_body() {
+  if (!result_.has_pose || result_.scale != ScaleState::kMetric || points_.body_m.isZero(0.0)) return;
+  const SE3 T_tracked_body{Eigen::Quaterniond::Identity(), points_.body_m};
+  result_.T_map_body = result_.T_map_body * T_tracked_body;
+  result_.T_odom_body = result_.T_odom_body * T_tracked_body;
+  Matrix6d carry = Matrix6d::Identity();
+  carry.topRightCorner<3, 3>() = -skew(points_.body_m);
+  result_.velocity_body = carry * result_.velocity_body;
+  result_.covariance = carry * result_.covariance * carry.transpose();
 }
 
 void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {

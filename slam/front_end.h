@@ -40,9 +40,8 @@ struct TakeLimit {
 
 class FrontEnd {
  public:
-  // `wheel_point_m`: where the wheels measure, from the rig's body.
   FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
-           const Eigen::Vector3d& wheel_point_m = Eigen::Vector3d::Zero());
+           const VehiclePoints& points = {});
 
   void listen(StageListener* listener);
 
@@ -107,6 +106,7 @@ class FrontEnd {
   void maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void pose_waiting_frames();
   void fill_map_state();
+  void place_body();
   void fill_pose(const SE3& T_map_body, const Matrix6d& covariance);
   [[nodiscard]] RecordedFrame relative_to_reference(const Frame& frame, const TrackOutcome& outcome) const;
   void record(const RecordedFrame& frame);
@@ -118,6 +118,7 @@ class FrontEnd {
   };
 
   const EstimatorConfig config_;
+  const VehiclePoints points_;
   FrameIntake intake_;
   Initialiser initialiser_;
   Tracker tracker_;

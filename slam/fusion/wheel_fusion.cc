@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>   // DEBUG
-#include <cstdlib>  // DEBUG
 
 #include "slam/fusion/wheel_motion_model.h"
 
@@ -19,7 +17,8 @@ constexpr double kTurnShare = 0.1;
 // The body's axes are mounted along the rolling direction to within three degrees: the motion across is known
 // no better.
 constexpr double kAcrossShare = 0.05;
-// Error of the images' motion between two keyframes: share of its length (0.3 to 1 % on recorded roads), and turn.
+// Error of the images' motion between two keyframes: share of its length (0.3 to 1 % on recorded roads), and
+// turn.
 constexpr double kImageShare = 0.01, kImageTurn_rad = 0.002;
 // An interval whose length is known no better than this tells no scale.
 constexpr double kUsefulShare = 0.2;
@@ -105,13 +104,6 @@ MotionVerdict WheelFusion::judge(Map* map, KeyframeHandle newest, const MapJudge
   const std::optional<Consensus> all = consensus();
   if (!all) return verdict;
   mark_slips(*all);
-  if (getenv("WHEEL_DEBUG")) {  // DEBUG
-    fprintf(stderr, "J %.3f n %zu agree %d share %.2f log %.4f sigma %.4f metric %d slipped:", 1e-6 * double(map->keyframes()[newest].utime), comparisons_.size(), all->intervals, all->share, all->log_ratio, all->sigma, judgement.metric);  // DEBUG
-    for (const Comparison& c : comparisons_) if (c.link->wheels_slipped) fprintf(stderr, " %.2f(%.3f/%.3f %d)", 1e-6 * double(c.link->to_utime), c.log_ratio, c.sigma, c.yaw_agrees);  // DEBUG
-    fprintf(stderr, "\nC");  // DEBUG
-    for (const Comparison& c : comparisons_) fprintf(stderr, " %.2f:%.3f", 1e-6 * double(c.link->to_utime), c.log_ratio);  // DEBUG
-    fprintf(stderr, "\n");  // DEBUG
-  }  // DEBUG
   if (turns_otherwise()) {
     verdict.trust = WheelTrust::kContradicted;
     return verdict;

@@ -9,6 +9,8 @@ namespace {
 
 // Sigma of an unknown yaw rate: the turn of any vehicle.
 constexpr double kUnknownYawRate_rad_per_s = 1.0;
+// A yaw rate known no better than this tells no turn.
+constexpr double kUsefulYawRate_rad_per_s = 0.1;
 
 }  // namespace
 
@@ -44,6 +46,8 @@ std::optional<SE3> WheelMotionModel::motion(std::int64_t from_utime, std::int64_
   if (trust_ == WheelTrust::kContradicted) return std::nullopt;
   const std::optional<WheelMotion> wheels = track_.up_to(from_utime, to_utime);
   if (!wheels) return std::nullopt;
+  const double most_rad = kUsefulYawRate_rad_per_s * wheels->duration_s();
+  if (wheels->covariance(2, 2) > most_rad * most_rad) return std::nullopt;
   SE3 T_from_to;
   T_from_to.q = so3_exp({0.0, 0.0, wheels->yaw_rad});
   T_from_to.t.head<2>() = factor_ * wheels->displacement_m;

@@ -13,6 +13,13 @@
 
 namespace farpoint::slam {
 
+// Points of the vehicle, from the body that tracking and map use, body axes. One camera's map has its body at
+// the camera: lever arms are in metres, which it lacks at first.
+struct VehiclePoints {
+  Eigen::Vector3d wheels_m = Eigen::Vector3d::Zero();  // where the wheels measure
+  Eigen::Vector3d body_m = Eigen::Vector3d::Zero();    // the calibration's body
+};
+
 // One thread. No heap call after the constructor.
 class WheelMotionModel {
  public:
@@ -30,7 +37,7 @@ class WheelMotionModel {
   void trust(WheelTrust trust, double factor);
 
   // The body's motion in metres, planar, T_from_to. The newest reading holds for max_gap_s at most. Empty
-  // where the wheels do not tell.
+  // where the wheels do not tell it, or no yaw rate.
   [[nodiscard]] std::optional<SE3> motion(std::int64_t from_utime, std::int64_t to_utime) const;
   // The wheels stood over the last kStanding_s.
   [[nodiscard]] bool stands(std::int64_t utime) const;

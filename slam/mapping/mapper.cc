@@ -242,9 +242,15 @@ void Mapper::judge_motion(KeyframeHandle newest) {
   if (verdict.metres_per_unit) {
     Sim3 to_metres;
     to_metres.scale = *verdict.metres_per_unit;
-    map_.transform(map_.keyframes()[newest].map_id, to_metres);
+    const std::int32_t map_id = map_.keyframes()[newest].map_id;
+    map_.transform(map_id, to_metres);
+    if (!has_metre(map_id)) metric_maps_.push_back(map_id);
   }
   settling_.note_motion(verdict);
+}
+
+bool Mapper::has_metre(std::int32_t map_id) const {
+  return std::binary_search(metric_maps_.begin(), metric_maps_.end(), map_id);
 }
 
 void Mapper::refine_calibration() {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
@@ -62,6 +63,8 @@ class Mapper {
   void transform_map(std::int32_t map_id, const Sim3& S_new_old) { map_.transform(map_id, S_new_old); }
 
   [[nodiscard]] const Map& map() const { return map_; }
+  // Whether another sensor has made the map's unit the metre.
+  [[nodiscard]] bool has_metre(std::int32_t map_id) const;
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
   [[nodiscard]] std::size_t view_bytes() const { return view_builder_.bytes(); }
@@ -104,6 +107,7 @@ class Mapper {
   std::optional<RigCalibrator> rig_calibrator_;  // of two cameras
   ViewBuilder view_builder_;
   MotionFactors* motion_ = nullptr;
+  std::vector<std::int32_t> metric_maps_;  // by motion_, ascending
   StageListener* listener_ = nullptr;
 };
 
