@@ -101,13 +101,13 @@ MotionVerdict WheelFusion::judge(Map* map, KeyframeHandle newest, const MapJudge
   fill_links(map, newest);
   compare(map, newest);
   MotionVerdict verdict{judgement.wheels, judgement.wheel_factor, judgement.unit_sigma, {}};
-  const std::optional<Consensus> all = consensus();
-  if (!all) return verdict;
-  mark_slips(*all);
   if (turns_otherwise()) {
     verdict.trust = WheelTrust::kContradicted;
     return verdict;
   }
+  const std::optional<Consensus> all = consensus();
+  if (!all) return verdict;
+  mark_slips(*all);
   if (metre_ == MetreSource::kCameras)
     judge_factor(*all, &verdict);
   else

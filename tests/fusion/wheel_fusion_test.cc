@@ -5,7 +5,14 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
+#include "slam/fusion/wheel_motion_model.h"
+#include "slam/solver/normal_equations.h"
 #include "tests/map/map_fixture.h"
 
 namespace farpoint::slam {
@@ -173,7 +180,8 @@ TEST(WheelFusion, FactorsActOnceTheMapIsMetricAndNotAcrossASlip) {
   d.fusion.add_to(d.map, pose_index, d.judgement, &problem);
   EXPECT_EQ(static_cast<int>(problem.factors.size()), links - d.slipped());
   EXPECT_GE(d.slipped(), 4);
-  for (const StateFactor* factor : problem.factors) EXPECT_LT(cost(*factor, problem.states()), 0.1);
+  // Within a sigma, also where an interval touches the slip.
+  for (const StateFactor* factor : problem.factors) EXPECT_LT(cost(*factor, problem.states()), 0.5);
   MapJudgement unknown = d.judgement;
   unknown.metric = false;
   problem.factors.clear();
