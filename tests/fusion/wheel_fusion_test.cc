@@ -189,28 +189,25 @@ TEST(WheelFusion, FactorsActOnceTheMapIsMetricAndNotAcrossASlip) {
   EXPECT_TRUE(problem.factors.empty());
 }
 
-TEST(WheelFusion, AGapOfTheWheelsIsNoMotion) {
-  WheelConfig config;
-  Drive d(config, MetreSource::kWheels);
+TEST(WheelFusion, TheNewestIntervalWaitsForALaterSample) {
+  Drive d({}, MetreSource::kWheels);
   d.drive(2.0);
-  d.drive(1.0);
   const ChainLink* link = std::as_const(d.map).chain().link_to(d.newest);
   ASSERT_NE(link, nullptr);
-  EXPECT_FALSE(link->wheels.has_value()) << "the newest interval waits for a later sample";
+  EXPECT_FALSE(link->wheels.has_value());
+  const ChainLink* before = std::as_const(d.map).chain().link_to(d.map.chain().before(d.newest));
+  ASSERT_NE(before, nullptr);
+  EXPECT_TRUE(before->wheels.has_value());
 }
 
 // Two cameras know the metre.
-Drive metric_drive(const WheelConfig& config) {
-  return Drive(config, MetreSource::kCameras);
-}
-
 void start_metric(Drive* d) {
   d->metres_per_unit = 1.0;
   d->judgement.metric = true;
 }
 
 TEST(WheelFusion, ATyreOfAnotherSizeIsEstimatedByTheCamerasMetre) {
-  Drive d = metric_drive({});
+  Drive d({}, MetreSource::kCameras);
   start_metric(&d);
   d.wheel_factor = [](double) { return 1.03; };
   d.drive(20.0);
@@ -222,7 +219,7 @@ TEST(WheelFusion, ATyreOfAnotherSizeIsEstimatedByTheCamerasMetre) {
 class WrongWheels : public testing::TestWithParam<double> {};
 
 TEST_P(WrongWheels, AreLeftOutWithinTwentySecondsOfDriving) {
-  Drive d = metric_drive({});
+  Drive d({}, MetreSource::kCameras);
   start_metric(&d);
   d.wheel_factor = [](double) { return GetParam(); };
   d.drive(20.0);
@@ -242,15 +239,71 @@ TEST(WheelFusion, AYawRateOfTheWrongSignIsLeftOutInTheFirstBend) {
   }
 }
 
-TEST(WheelFusion, AnUnknownYawRateIsNoContradiction) {
-  Drive d({}, MetreSource::kWheels);
-  d.yaw_rate_radps = 0.2;
-  d.yaw_gain = [](double) { return 0.0; };
-  const WheelSample s{1, 1.0, 0.0, 0.0, std::numeric_limits<double>::infinity()};
-  const std::optional<WheelSample> usable = usable_sample(s, WheelConfig{});
+TEST(WheelFusion, AnUnknownYawRateIsNoContradictionAndLeadsNowhereBlind) {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  WheelMotionModel model({}, Eigen::Vector3d::Zero()), turning({}, Eigen::Vector3d::Zero());
+  for (int i = 0; i <= 50; ++i) {
+    model.add({20'000 * i, 5.0, 0.0, 0.0, kUnknown});
+    turning.add({20'000 * i, 5.0, 0.2, 0.0, 0.0});
+  }
+  EXPECT_FALSE(model.motion(500'000, 900'000).has_value());
+  ASSERT_TRUE(turning.motion(500'000, 900'000).has_value());
+  EXPECT_NEAR(turning.motion(500'000, 900'000)->t.norm(), 2.0, 0.01);
+  EXPECT_FALSE(usable_sample({1, 0.0, 0.1, kUnknown, 0.0}, {}).has_value()) << "no speed";
+}
+
+TEST(WheelMotion, IsThatOfTheBodyWhereverTheWheelsMeasure) {
+  const Eigen::Vector3d point_m(-1.5, 0.5, -0.3);
+  WheelMotionModel model({}, point_m);
+  for (int i = 0; i <= 50; ++i) model.add({20'000 * i, 5.0, 0.4, 0.0, 0.0});
+  const std::optional<SE3> T = model.motion(0, 1'000'000);
+  ASSERT_TRUE(T.has_value());
+  const double yaw = 0.4, radius = 5.0 / 0.4;
+  const Eigen::Vector3d arc(radius * std::sin(yaw), radius * (1.0 - std::cos(yaw)), 0.0);
+  EXPECT_LT((*T * point_m - point_m - arc).norm(), 1e-3);
+  EXPECT_NEAR(so3_log(T->q).z(), yaw, 1e-9);
+}
+
+TEST(WheelMotion, StandsOnlyAfterATimeOfZeros) {
+  WheelMotionModel model({}, Eigen::Vector3d::Zero());
+  const auto utime = [](int i) { return std::int64_t{20'000} * i; };
+  for (int i = 0; i <= 50; ++i) model.add({utime(i), i < 40 ? 1.0 : 0.0, 0.0, 0.0, 0.0});
+  EXPECT_FALSE(model.stands(utime(50)));
+  for (int i = 51; i <= 60; ++i) model.add({utime(i), 0.0, 0.0, 0.0, 0.0});
+  EXPECT_TRUE(model.stands(utime(60)));
+  EXPECT_FALSE(model.stands(utime(60) + 500'000)) << "silent wheels";
+  model.trust(WheelTrust::kContradicted, 1.0);
+  EXPECT_FALSE(model.stands(utime(60)));
+}
+
+TEST(WheelMotion, ALateSampleIsOfTheTimeOfItsMotion) {
+  WheelConfig config;
+  config.delay_ms = 40.0;
+  const std::optional<WheelSample> usable = usable_sample({1'000'000, 1.0, 0.0, 0.0, 0.0}, config);
   ASSERT_TRUE(usable.has_value());
-  EXPECT_TRUE(std::isfinite(usable->sigma_yaw_rate_rad_per_s));
-  EXPECT_FALSE(usable_sample({1, 0.0, 0.1, std::numeric_limits<double>::infinity(), 0.0}, {}).has_value());
+  EXPECT_EQ(usable->utime, 960'000);
+}
+
+TEST(WheelLink, JoinsTwoMotionsAsOneAndNoneWhereEitherSlipped) {
+  const auto link = [](int from, int to, bool slipped) {
+    ChainLink l{.from_utime = from, .to_utime = to};
+    l.wheels = WheelMotion{from, to, {2.0, 0.0}, 0.5, Eigen::Matrix3d::Identity()};
+    l.wheels_slipped = slipped;
+    return l;
+  };
+  ChainLink joined = link(0, 1, false);
+  joined.append(link(1, 2, false));
+  ASSERT_TRUE(joined.wheels.has_value());
+  EXPECT_NEAR(joined.wheels->displacement_m.x(), 2.0 + 2.0 * std::cos(0.5), 1e-12);
+  EXPECT_NEAR(joined.wheels->displacement_m.y(), 2.0 * std::sin(0.5), 1e-12);
+  EXPECT_NEAR(joined.wheels->yaw_rad, 1.0, 1e-12);
+  EXPECT_EQ(joined.wheels->to_utime, 2);
+  for (const bool first : {true, false}) {
+    ChainLink slipped = link(0, 1, first);
+    slipped.append(link(1, 2, !first));
+    EXPECT_FALSE(slipped.wheels.has_value());
+    EXPECT_FALSE(slipped.wheels_slipped);
+  }
 }
 
 }  // namespace
