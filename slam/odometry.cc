@@ -62,6 +62,7 @@ void Odometry::advance(const SE3& T_map_body, std::int64_t utime, double sigma) 
 
 void Odometry::carry(const SE3& T_from_to) {
   T_odom_body_ = T_odom_body_ * T_from_to;
+  T_odom_body_corrected_ = T_odom_body_;  // unseen way allows no correction: it would come at once
   T_map_body_last_ = T_map_body_last_ * in_unit(T_from_to, map_units_);
 }
 
