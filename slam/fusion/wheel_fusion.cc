@@ -212,7 +212,7 @@ void WheelFusion::mark_slips(const Consensus& consensus) {
     c.link->wheels_slipped = !agrees(c, consensus.log_ratio, consensus.sigma);
 }
 
-// The cameras know the metre: the wheels' factor is estimated, or they are left out.
+// The cameras give the metre: the wheels' factor is estimated, or they are left out.
 void WheelFusion::judge_factor(const Consensus& consensus, MotionVerdict* verdict) const {
   const double prior = squared(config_.scale_sigma), seen = squared(consensus.sigma);
   if (static_cast<int>(comparisons_.size()) < kFewestToContradict) return;

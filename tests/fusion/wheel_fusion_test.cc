@@ -200,7 +200,7 @@ TEST(WheelFusion, TheNewestIntervalWaitsForALaterSample) {
   EXPECT_TRUE(before->wheels.has_value());
 }
 
-// Two cameras know the metre.
+// Two cameras give the metre.
 void start_metric(Drive* d) {
   d->metres_per_unit = 1.0;
   d->judgement.metric = true;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Importers: what they find in recordings of each layout, and what they say about malformed ones.
+// Long file: the layouts share the recordings that are made here, and their lists of damages.
 #include <gtest/gtest.h>
 
 #include <functional>
