@@ -71,7 +71,7 @@ struct FrameResult {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
   State state = State::kStarting;
-  bool has_pose = false;  // T_map_body is an estimate (not necessarily valid, see state)
+  bool has_pose = false;    // T_map_body is an estimate (not necessarily valid, see state)
   bool from_vision = true;  // false: carried on by wheels alone
   SE3 T_map_body;
   SE3 T_odom_body;  // continuous: integrates relative motion, never jumps

@@ -32,8 +32,8 @@ struct MapJudgement {
   double scale_change = 1.0;              // factor of the unit by the last adjustment
   Refusal unsound{};                      // what the last adjustment left too much of
   WheelTrust wheels = WheelTrust::kNone;
-  double wheel_factor = 1.0;      // metres driven in one that the wheels tell
-  double unit_sigma = 0.0;        // of the metre, relative, where wheels gave it; 0 without them
+  double wheel_factor = 1.0;  // metres driven in one that the wheels tell
+  double unit_sigma = 0.0;    // of the metre, relative, where wheels gave it; 0 without them
 
   // How long the map has been sound, as of a frame at `utime`. The time since the last adjustment counts: a
   // vehicle that stands makes no keyframes.
