@@ -225,6 +225,7 @@ std::unique_ptr<Session> LiveRun::open_session() {
   config_.estimator.capacity.whole_trajectory = wants_results();
   std::unique_ptr<Session> session =
       make_session(config_, calibration_, &outputs_, !options_.output.empty(), wants_results());
+  session->reporter().set_camera(config_.camera.device);
   if (config_.realtime.deadline_ms == 0.0) session->reporter().set_deadline(1e3 / config_.camera.rate_hz);
   return session;
 }

@@ -127,6 +127,7 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   PipelineOptions pipeline_options;
   pipeline_options.width_px = first.image->width_px;
   pipeline_options.height_px = first.image->height_px;
+  pipeline_options.second_pixels = source.second_pixels();
   const PipelineParts parts{&paced,   &session->estimator(), &session->reporter(),
                             &outputs, &session->tally(),     &realtime};
   Pipeline pipeline(config, pipeline_options, parts);

@@ -46,7 +46,7 @@ class Estimator {
   const FrameResult& process(FeatureInput&& input);
 
   // Announces the stages of every later frame; null ends that. The listener must outlive its use. Called on
-  // the thread that does the work: usable with one thread only.
+  // the thread that does the work: of two threads on both at once. Set while no thread runs.
   void listen(StageListener* listener);
 
   // Threads. track() is process() without mapping. map() works on the oldest job up to its next reply; false

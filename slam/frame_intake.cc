@@ -183,7 +183,8 @@ bool FrameIntake::fill_view(const CameraImage& input, int most_features, Frame* 
 void FrameIntake::fill_pixels(const CameraImage& input, Frame* frame) {
   CameraIntake& camera = *cameras_[static_cast<std::size_t>(input.camera)];
   const std::uint64_t hash = pixel_hash(input.image);
-  if (std::exchange(camera.image_hash, hash) == hash) return;  // of the past
+  // A repeated image shows nothing of the present.
+  if (std::exchange(camera.image_hash, hash) == hash) return;
   const std::shared_ptr<PyramidBuffer> pixels = camera.pyramids.take();
   if (!pixels) return;
   const StageSpan span(listener_, Stage::kPyramid);

@@ -8,6 +8,7 @@
 
 #include "daemon/check/checks.h"
 #include "daemon/config/errors.h"
+#include "daemon/config/mask_file.h"
 #include "daemon/config/rig.h"
 #include "daemon/input/live_camera_options.h"
 #include "drivers/camera/camera_path.h"
@@ -23,8 +24,6 @@
 
 namespace farpoint::daemon {
 namespace {
-
-constexpr double kRateTolerance = 0.98;
 
 // One camera that is looked at.
 struct Looked {
@@ -60,7 +59,7 @@ void check_v4l2(const Looked& camera, const std::string& root) {
                                         o.height_px, to_string(look.offered.format));
   const double fastest = look.offered.fastest_hz;
   if (fastest <= 0.0) return camera.ok(offer + ", at a rate that the driver does not list");
-  if (o.rate_hz > 0.0 && fastest < kRateTolerance * o.rate_hz)
+  if (!look.offered.reaches(o.rate_hz))
     return camera.warn(fmt::format("{} at no more than {:.4g} Hz, expected {:.4g} Hz (camera.rate_hz)", offer,
                                    fastest, o.rate_hz));
   camera.ok(fmt::format("{} at up to {:.4g} Hz", offer, fastest));
@@ -131,15 +130,30 @@ void check_camera(CameraDriverChoice driver, const Looked& camera, const std::st
   }
 }
 
-std::string described(const calibration_t& calibration, const CameraConfig& config) {
+void check_mask(const CameraConfig& config, const calibration_t& calibration, int index, Findings* findings) {
+  const std::string what = index == 0 ? "mask" : "second mask", key = index == 0 ? "mask" : "second_mask";
+  const std::string& file = index == 0 ? config.mask : config.second_mask;
+  if (file == "none") return findings->ok(what, "none (camera." + key + ")");
+  if (index >= static_cast<int>(calibration.cameras.size()))
+    return findings->warn(what, fmt::format("{}: not used, since there is no camera {}", file, index));
+  const camera_calibration_t& camera = calibration.cameras[static_cast<std::size_t>(index)];
+  try {
+    const auto mask = read_mask(config, index, camera.width, camera.height);
+    findings->ok(what, fmt::format("{}: {:.1f} % of the image", file, 100.0 * mask->share()));
+  } catch (const ConfigError& error) {
+    findings->fail(what, error.what());
+  }
+}
+
+}  // namespace
+
+std::string described(const calibration_t& calibration) {
   std::string text;
   for (const camera_calibration_t& camera : calibration.cameras)
     text += fmt::format("{}{} x {}, {}, focal length {:.1f} px", text.empty() ? "" : "; ", camera.width,
                         camera.height, camera.model, camera.fx);
-  return config.calibration + ": " + text + ", hash " + calibration_hash(calibration);
+  return text + ", hash " + calibration_hash(calibration);
 }
-
-}  // namespace
 
 std::optional<calibration_t> check_calibration(const Config& config, Findings* findings) {
   const std::string what = "calibration";
@@ -148,7 +162,7 @@ std::optional<calibration_t> check_calibration(const Config& config, Findings* f
     calibration_t calibration = read_live_calibration(config, &notices);
     (void)make_rig(calibration, config.camera.index);
     for (const std::string& notice : notices) findings->warn(what, notice);
-    findings->ok(what, described(calibration, config.camera));
+    findings->ok(what, config.camera.calibration + ": " + described(calibration));
     return calibration;
   } catch (const std::runtime_error& error) {
     findings->fail(what, error.what());
@@ -163,6 +177,12 @@ void check_cameras(const Config& config, const calibration_t& calibration, const
     const drivers::CameraOptions options = camera_options(config, calibration, index);
     check_camera(config.camera.driver, {options, index == 0 ? "camera" : "second camera", findings}, root);
   }
+}
+
+void check_masks(const Config& config, const calibration_t& calibration, Findings* findings) {
+  check_mask(config.camera, calibration, 0, findings);
+  if (calibration.cameras.size() > 1 || config.camera.second_mask != "none")
+    check_mask(config.camera, calibration, 1, findings);
 }
 
 }  // namespace farpoint::daemon

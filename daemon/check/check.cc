@@ -26,18 +26,36 @@ void check_solver(const Config& config, Findings* findings) {
   }
 }
 
-void check_configured(const Options& options, const Config& config, Findings* findings) {
-  check_solver(config, findings);
+// Only what was asked for leaves a replay, and no thread of it has a deadline.
+void check_replay(const Options& options, const Config& config, Findings* findings) {
+  const std::optional<calibration_t> calibration = check_log(options.replay, config, findings);
+  if (calibration) check_masks(config, *calibration, findings);
+  if (options.lcm_url) check_network(options, config, findings);
+  if (options.can_interface) check_bus(options, config, findings);
+  check_outputs(options, findings);
+}
+
+void check_live(const Options& options, const Config& config, Findings* findings) {
   const std::optional<calibration_t> calibration = check_calibration(config, findings);
-  if (calibration)
+  if (calibration) {
+    check_masks(config, *calibration, findings);
     check_cameras(config, *calibration, "", findings);
-  else
+  } else {
     findings->warn("camera", "not looked at: its calibration cannot be used");
+  }
   check_network(options, config, findings);
   check_bus(options, config, findings);
   check_privileges(config.realtime, read_privileges(), usable_cores(), "", findings);
   check_clocks(read_clocks(), findings);
   check_folders(options, config, calibration, findings);
+}
+
+void check_configured(const Options& options, const Config& config, Findings* findings) {
+  check_solver(config, findings);
+  if (options.replay.empty())
+    check_live(options, config, findings);
+  else
+    check_replay(options, config, findings);
 }
 
 }  // namespace

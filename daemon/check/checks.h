@@ -20,9 +20,19 @@ namespace farpoint::daemon {
 // Calibration of the live cameras. Returns it where it can be used.
 std::optional<calibration_t> check_calibration(const Config& config, Findings* findings);
 
+// Size, model, focal length of each camera, and the hash.
+[[nodiscard]] std::string described(const calibration_t& calibration);
+
 // Each live camera, by its driver. `root`: see CameraPath.
 void check_cameras(const Config& config, const calibration_t& calibration, const std::string& root,
                    Findings* findings);
+
+// The masks of the cameras: read, held against the images' size, with the share that each covers.
+void check_masks(const Config& config, const calibration_t& calibration, Findings* findings);
+
+// The log of a replay: its calibration, images and measurements, read to the end without decoding more than
+// the first image. Returns the calibration where it can be used.
+std::optional<calibration_t> check_log(const std::string& path, const Config& config, Findings* findings);
 
 // URL and route.
 void check_network(const Options& options, const Config& config, Findings* findings);
@@ -58,5 +68,7 @@ void check_clocks(const Clocks& clocks, Findings* findings);
 // size of a recording; none: unknown.
 void check_folders(const Options& options, const Config& config,
                    const std::optional<calibration_t>& calibration, Findings* findings);
+// The files of --output, --trajectory, --live-trajectory and --can-log.
+void check_outputs(const Options& options, Findings* findings);
 
 }  // namespace farpoint::daemon

@@ -110,15 +110,19 @@ void check_commands(const std::string& socket, Findings* findings) {
 
 }  // namespace
 
+void check_outputs(const Options& options, Findings* findings) {
+  check_file("--output", options.output, findings);
+  check_file("--trajectory", options.trajectory, findings);
+  check_file("--live-trajectory", options.live_trajectory, findings);
+  check_file("--can-log", options.can_log, findings);
+}
+
 void check_folders(const Options& options, const Config& config,
                    const std::optional<calibration_t>& calibration, Findings* findings) {
   check_recording(options, config, calibration, findings);
   check_state(config.state.folder, findings);
   check_file("log file", config.log.file, findings);
-  check_file("--output", options.output, findings);
-  check_file("--trajectory", options.trajectory, findings);
-  check_file("--live-trajectory", options.live_trajectory, findings);
-  check_file("--can-log", options.can_log, findings);
+  check_outputs(options, findings);
   check_commands(config.control.socket, findings);
 }
 

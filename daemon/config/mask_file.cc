@@ -91,9 +91,9 @@ std::shared_ptr<const slam::ImageMask> read_mask(const CameraConfig& config, int
   if (place.file == kNone) return nullptr;
   const ipc::GreyImage image = decode(place, read_bytes(place), width_px, height_px);
   auto mask = std::make_shared<const slam::ImageMask>(width_px, height_px, image.pixels);
-  if (mask->share() > kMostMaskedShare)
+  if (mask->share() > slam::ImageMask::kMostShare)
     place.fail(fmt::format("masks {:.1f} % of the image, expected at most {:.0f} %", 100.0 * mask->share(),
-                           100.0 * kMostMaskedShare));
+                           100.0 * slam::ImageMask::kMostShare));
   return mask;
 }
 

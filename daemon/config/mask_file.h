@@ -11,9 +11,6 @@
 
 namespace farpoint::daemon {
 
-// Largest masked share of an image: what is left of a smaller rest carries no pose.
-inline constexpr double kMostMaskedShare = 0.9;
-
 // Null where the key is 'none' or the camera has no key. Throws ConfigError naming key, file and what was
 // expected: no such file, no PNG file of 8-bit grey, another size than the camera's, too much masked.
 [[nodiscard]] std::shared_ptr<const slam::ImageMask> read_mask(const CameraConfig& config, int camera,

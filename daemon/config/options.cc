@@ -26,6 +26,7 @@ constexpr const char* kDescription =
 constexpr const char* kFooter =
     "Examples\n"
     "  farpointd --check\n"
+    "  farpointd --check --replay run.lcm\n"
     "  farpointd --set camera.device=/dev/video0 --set camera.calibration=front.yaml --record run.lcm\n"
     "  farpoint import kitti /data/kitti 03 -o run.lcm\n"
     "  farpointd --replay run.lcm --lockstep --output out.lcm --trajectory final.tum --live-trajectory "
@@ -57,8 +58,8 @@ void add_options(CLI::App* app, Parsed* parsed) {
       ->type_name("LOG");
   app->add_flag(
       "--check", o.check,
-      "Look whether a live run would work here, print one line a thing (ok, warning, error) and leave: "
-      "status 0, or 2 with an error. Sets nothing, writes nothing");
+      "Look whether a live run, or with --replay that replay, would work here, print one line a thing (ok, "
+      "warning, error) and leave: status 0, or 2 with an error. Sets nothing, writes nothing");
   app->add_flag("--json", o.json, "With --check: as JSON");
   app->add_flag(
       "--lockstep", parsed->lockstep,
@@ -130,7 +131,7 @@ void check(const Parsed& parsed) {
     throw UsageError("--schedule " + parsed.schedule + ": unknown, expected recorded");
   if (!o.schedule_log.empty() && parsed.schedule.empty())
     throw UsageError("--schedule-log without --schedule recorded, expected both");
-  if (o.check && replays) throw UsageError("--check is of a live run, expected --check or --replay");
+  if (o.check && o.replay == "-") throw UsageError("--check --replay -: expected a log that is a file");
   if (o.json && !o.check) throw UsageError("--json without --check, expected both");
   if (parsed.lockstep && o.speed) throw UsageError("--lockstep and --speed exclude each other, expected one");
   if (o.speed && !(*o.speed > 0.0 && *o.speed <= kMaxSpeed))

@@ -22,7 +22,7 @@ struct Options {
   // Present and empty: lcm.url or can.interface of the configuration.
   std::optional<std::string> lcm_url, can_interface;
   std::vector<std::string> settings;  // "dotted.key=value", in order
-  bool check = false;                 // look whether a live run would work, and leave
+  bool check = false;                 // look whether the run would work, and leave
   bool json = false;                  // with check
 };
 

@@ -11,11 +11,8 @@ namespace farpoint::daemon {
 
 class CameraEvents {
  public:
-  // Call before the first image. This object outlives the camera.
-  void listen_to(drivers::Camera* camera) {
-    camera->on_event([this](const drivers::CameraEvent& event) { (void)events_.push(event); });
-  }
-
+  // Capture thread.
+  void put(const drivers::CameraEvent& event) { (void)events_.push(event); }
   // One other thread: takes the oldest new event; false without one.
   [[nodiscard]] bool take(drivers::CameraEvent* event) {
     const drivers::CameraEvent* oldest = events_.front();

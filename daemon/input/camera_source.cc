@@ -18,7 +18,14 @@ constexpr int kTurn_ms = 100;
 
 CameraSource::CameraSource(int index, std::unique_ptr<drivers::Camera> camera)
     : index_(index), thread_name_("fp-capture-" + std::to_string(index)), camera_(std::move(camera)) {
-  events_.listen_to(camera_.get());
+  camera_->on_event([this](const drivers::CameraEvent& event) { note(event); });
+}
+
+void CameraSource::note(const drivers::CameraEvent& event) {
+  events_.put(event);
+  if (event.kind != drivers::CameraEvent::Kind::kStreaming) return;
+  note_.format = event.format;
+  note_.rate_hz = event.rate_hz;
 }
 
 bool CameraSource::grab(ipc::GreyImage* image, drivers::CameraFrame* frame) {
@@ -38,6 +45,11 @@ CaptureStatus CameraSource::next(const std::atomic<bool>& /*stop*/, CapturedImag
     pair.note(came ? std::optional(image->meta) : std::nullopt, std::llround(1e6 * steady_s()));
     pair.add_to(&image->in);
   }
+  if (came) {
+    note_.exposure_us = image->meta.exposure_us;
+    note_.gain = image->meta.gain;
+  }
+  image->camera = note_;
   image->progress = -1.0;
   if (!came) return camera_->is_streaming() ? CaptureStatus::kNothing : CaptureStatus::kAway;
   // Both are CLOCK_MONOTONIC: the age of what is published counts from mid-exposure.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/input/camera_events.h"
+#include "daemon/input/camera_note.h"
 #include "daemon/input/camera_reports.h"
 #include "daemon/input/camera_troubles.h"
 #include "daemon/input/capture_source.h"
@@ -59,12 +60,14 @@ class CameraSource final : public CaptureSource {
   void set_exposure(const drivers::ExposureOptions& options) { camera_->set_exposure(options); }
 
  private:
+  void note(const drivers::CameraEvent& event);
   [[nodiscard]] double opening_s(double now_s) const;
   [[nodiscard]] bool grab(ipc::GreyImage* image, drivers::CameraFrame* frame);
 
   const int index_;
   const std::string thread_name_;
   CameraEvents events_;
+  CameraNote note_;  // capture thread
   CameraTroubles troubles_;
   std::unique_ptr<drivers::Camera> camera_;
   std::atomic<Recorder*> recorder_{nullptr};

@@ -3,10 +3,13 @@
 
 namespace farpoint::daemon {
 
-ImageQueue::ImageQueue(std::size_t capacity, int width_px, int height_px)
+ImageQueue::ImageQueue(std::size_t capacity, int width_px, int height_px, std::size_t second_pixels)
     : slots_(capacity + 2), ring_(capacity) {
   const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-  for (Slot& slot : slots_) slot.image.image = {width_px, height_px, std::vector<std::uint8_t>(pixels, 0)};
+  for (Slot& slot : slots_) {
+    slot.image.image = {width_px, height_px, std::vector<std::uint8_t>(pixels, 0)};
+    slot.image.second.pixels.reserve(second_pixels);
+  }
 }
 
 CapturedImage* ImageQueue::begin_push() {
@@ -61,7 +64,8 @@ std::size_t ImageQueue::waiting() const {
 }
 
 std::size_t ImageQueue::bytes() const {
-  return slots_.size() * (sizeof(Slot) + slots_.front().image.image.pixels.capacity());
+  const CapturedImage& one = slots_.front().image;
+  return slots_.size() * (sizeof(Slot) + one.image.pixels.capacity() + one.second.pixels.capacity());
 }
 
 }  // namespace farpoint::daemon

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "daemon/input/camera_note.h"
 #include "daemon/input/frame_source.h"
 #include "ipc/image_codec.h"
 
@@ -20,6 +21,7 @@ struct CapturedImage {
   bool has_second = false;
   drivers::CameraFrame meta;
   InputCounts in;                   // at the time of reading
+  CameraNote camera;                // live
   std::int64_t frames_dropped = 0;  // at the time of queueing
   double due_s = 0;                 // steady clock
   double decode_cpu_ms = -1.0, decode_wall_ms = -1.0;
@@ -30,8 +32,8 @@ struct CapturedImage {
 // image. Neither side waits.
 class ImageQueue {
  public:
-  // `capacity`: images that wait at most.
-  ImageQueue(std::size_t capacity, int width_px, int height_px);
+  // `capacity`: images that wait at most. `second_pixels`: of a second camera's images; 0: there is none.
+  ImageQueue(std::size_t capacity, int width_px, int height_px, std::size_t second_pixels = 0);
 
   // Capture: returns the image to fill, owned by the caller until push().
   [[nodiscard]] CapturedImage* begin_push();

@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -75,22 +76,18 @@ void LogFrameSource::take(const drivers::LogItem& item, StageClock* clock) {
   }
 }
 
-void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, std::deque<Decoded>* out) {
+void LogFrameSource::decode(const drivers::LogItem& item, StageClock* clock, WaitingImages* out) {
   const StageScope scope(clock, timing_t::STAGE_DECODE);
-  const ipc::ImageStatus status = source_.decode(item, &spare_);
+  const ipc::ImageStatus status = source_.decode(item, &decoded_);
   if (status == ipc::ImageStatus::kWrongSize) ++wrong_size_decoded_;
   if (status != ipc::ImageStatus::kOk) return say_undecodable(status);
-  out->push_back({{item.utime, item.image->sequence, item.image->exposure_us, item.image->gain},
-                  std::exchange(spare_, {})});
+  out->push({item.utime, item.image->sequence, item.image->exposure_us, item.image->gain}, &decoded_);
 }
 
 // Precondition: an image of the first camera waits.
 void LogFrameSource::forget_past_seconds() {
-  const std::int64_t oldest = firsts_.front().meta.utime - config_.camera.pair_tolerance_us;
-  while (!seconds_.empty() && seconds_.front().meta.utime < oldest) {
-    spare_ = std::move(seconds_.front().image);
-    seconds_.pop_front();
-  }
+  const std::int64_t oldest = firsts_.front().utime - config_.camera.pair_tolerance_us;
+  while (!seconds_.empty() && seconds_.front().utime < oldest) seconds_.drop();
 }
 
 bool LogFrameSource::may_give() {
@@ -100,19 +97,29 @@ bool LogFrameSource::may_give() {
 }
 
 void LogFrameSource::give(SourceFrame* frame) {
-  forget_past_seconds();
-  std::swap(image_, firsts_.front().image);
-  *frame = {firsts_.front().meta, &image_, nullptr};
-  spare_ = std::move(firsts_.front().image);
-  firsts_.pop_front();
-  if (!seconds_.empty() &&
-      seconds_.front().meta.utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {
-    std::swap(second_image_, seconds_.front().image);
-    seconds_.pop_front();
+  *frame = {firsts_.front(), &image_, nullptr};
+  firsts_.pop(&image_);
+  if (!seconds_.empty() && seconds_.front().utime <= frame->meta.utime + config_.camera.pair_tolerance_us) {
+    seconds_.pop(&second_image_);
     frame->second = &second_image_;
   }
   gave_image_ = true;
   given_utime_ = frame->meta.utime;
+}
+
+std::size_t LogFrameSource::second_pixels() const {
+  if (!second_camera_) return 0;
+  const auto& camera = calibration_->cameras[static_cast<std::size_t>(*second_camera_)];
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
+void LogFrameSource::reserve_waiting() {
+  const auto& camera = calibration_->cameras[static_cast<std::size_t>(config_.camera.index)];
+  const std::size_t first = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = std::max(first, second_pixels());  // buffers change places
+  firsts_.reserve(pixels);
+  seconds_.reserve(pixels);
+  for (ipc::GreyImage* image : {&image_, &second_image_, &decoded_}) image->pixels.reserve(pixels);
 }
 
 // Once: the counts say how many follow.
@@ -154,6 +161,7 @@ void LogFrameSource::take_calibration(const calibration_t& calibration) {
     }
     calibration_ = calibration;
     second_camera_ = second_camera(calibration, config_.camera);
+    if (second_camera_) reserve_waiting();
     return;
   }
   if (calibration_hash(calibration) == calibration_hash(*calibration_)) return;

@@ -11,6 +11,7 @@
 #include "daemon/config/config.h"
 #include "daemon/input/frame_source.h"
 #include "daemon/input/measurement_feed.h"
+#include "daemon/input/waiting_images.h"
 #include "drivers/log/log_source.h"
 
 namespace farpoint::daemon {
@@ -30,6 +31,8 @@ class LogFrameSource final : public FrameSource {
   void feed_to(MeasurementFeed* feed);
   void swap_image(ipc::GreyImage* image) override { std::swap(*image, image_); }
   void swap_second(ipc::GreyImage* image) override { std::swap(*image, second_image_); }
+  // Of the second camera's images; 0 without one.
+  [[nodiscard]] std::size_t second_pixels() const;
   [[nodiscard]] const calibration_t& calibration() const override { return *calibration_; }
   [[nodiscard]] InputCounts counts() const override;
   [[nodiscard]] double progress() const override;
@@ -43,18 +46,14 @@ class LogFrameSource final : public FrameSource {
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
-  // An image that was decoded and not given yet.
-  struct Decoded {
-    drivers::CameraFrame meta;
-    ipc::GreyImage image;
-  };
-
   void take(const drivers::LogItem& item, StageClock* clock);
-  void decode(const drivers::LogItem& item, StageClock* clock, std::deque<Decoded>* out);
+  void decode(const drivers::LogItem& item, StageClock* clock, WaitingImages* out);
   void forget_past_seconds();
   [[nodiscard]] bool may_give();
+  // Precondition: may_give() was the last call and an image of the first camera waits.
   void give(SourceFrame* frame);
   void take_calibration(const calibration_t& calibration);
+  void reserve_waiting();
   void feed(const drivers::LogItem& item);
   void say_undecodable(ipc::ImageStatus status);
   void keep_early(const drivers::LogItem& item);
@@ -79,8 +78,8 @@ class LogFrameSource final : public FrameSource {
   // its own have come: the log's reader holds a doubtful image for one period.
   static constexpr std::size_t kAhead = 2;
   std::optional<int> second_camera_;
-  std::deque<Decoded> firsts_, seconds_;
-  ipc::GreyImage second_image_, spare_;
+  WaitingImages firsts_, seconds_;
+  ipc::GreyImage second_image_, decoded_;
   bool ended_ = false;
   double file_bytes_ = -1.0;
   std::uint64_t offset_ = 0;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "daemon/input/camera_note.h"
 #include "daemon/input/counts.h"
 #include "daemon/system/stage_clock.h"
 #include "slam/frame_result.h"
@@ -22,6 +23,7 @@ struct FramePackage {
   slam::FrameResult result;
   slam::EstimatorCounts counts;
   InputCounts in;
+  CameraNote camera;  // live
   FrameChance chance;
   StageClock clock;
   double due_s = 0;        // steady clock; threaded runs

@@ -72,6 +72,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
   note_state(frame_.result);
   silence_.counts = package->counts;
   silence_.chance = package->chance;
+  silence_.camera = package->camera;
   if (publisher_->has_sinks()) {
     publisher_->publish(
         ipc::kTimingChannel, result.utime,
@@ -203,6 +204,11 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.vmps = static_cast<std::int32_t>(counts.mapping.vmp_alive);
   note_reason(r, counts.mapping.calibration_contradicted, &s);
   s.times_lost = static_cast<std::int64_t>(counts.lost);
+  const CameraNote& camera = package.camera;
+  s.camera_format = camera.format == drivers::CameraFormat::kAuto ? "" : to_string(camera.format);
+  s.camera_rate_hz = camera.rate_hz;
+  s.camera_exposure_us = camera.exposure_us;
+  s.camera_gain = camera.gain;
   s.capture_queue = chance.capture_queue;
   s.mapping_queue = r.jobs_under_way;
   s.publish_queue = chance.publish_queue;

@@ -34,6 +34,8 @@ class FrameReporter {
                                     const OutputCounts& out);
   // Before the first frame. See realtime.deadline_ms.
   void set_deadline(double deadline_ms) { deadline_ms_ = deadline_ms; }
+  // Before the first frame, live: the tracked camera's name.
+  void set_camera(const std::string& name) { status_.camera = name; }
   // Any thread. The next pose becomes the origin of odom, and the reset counter goes up.
   void reset_odom() { reset_odom_.store(true, std::memory_order_relaxed); }
   // Any thread.

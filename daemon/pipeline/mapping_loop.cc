@@ -9,7 +9,9 @@ constexpr std::int64_t kLookEvery_us = 10'000;
 }  // namespace
 
 MappingLoop::MappingLoop(slam::Estimator* estimator, const TrackingLoop* tracking, double limit_s)
-    : estimator_(*estimator), tracking_(*tracking), progress_(limit_s) {}
+    : estimator_(*estimator), tracking_(*tracking), progress_(limit_s) {
+  estimator_.listen(&times_);
+}
 
 void MappingLoop::run(const std::function<void()>& on_mapped) {
   for (;;) {
@@ -17,6 +19,7 @@ void MappingLoop::run(const std::function<void()>& on_mapped) {
     // Read before looking for a job: none can come after the last look.
     const bool is_last = tracking_.has_ended();
     const bool has_mapped = estimator_.map();
+    if (has_mapped) times_.hand_over();
     if (has_mapped && on_mapped) on_mapped();
     progress_.step();
     if (has_mapped) continue;

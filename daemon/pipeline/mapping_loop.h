@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "daemon/pipeline/mapping_times.h"
 #include "daemon/pipeline/thread_progress.h"
 #include "daemon/pipeline/tracking_loop.h"
 #include "daemon/system/notifier.h"
@@ -15,9 +16,15 @@ class MappingLoop {
  public:
   // Both must outlive this object. limit_s: see ThreadProgress.
   MappingLoop(slam::Estimator* estimator, const TrackingLoop* tracking, double limit_s);
+  ~MappingLoop() { estimator_.listen(nullptr); }
+  MappingLoop(const MappingLoop&) = delete;
+  MappingLoop& operator=(const MappingLoop&) = delete;
 
   // The thread: until tracking has ended and no job waits. on_mapped: called after each reply.
   void run(const std::function<void()>& on_mapped);
+
+  // Output's thread: adds the times of the keyframes that are done since the last call.
+  void add_times_to(StageClock* clock) { times_.add_to(clock); }
 
   // Any thread: a job was sent. Without this call mapping looks every 10 ms.
   void wake() { jobs_.notify(); }
@@ -29,6 +36,7 @@ class MappingLoop {
   const TrackingLoop& tracking_;
   Notifier jobs_;
   ThreadProgress progress_;
+  MappingTimes times_;
 };
 
 }  // namespace farpoint::daemon

@@ -55,6 +55,7 @@ void OutputLoop::report(FramePackage* package, double tracking_cpu_s, const Hook
   const double wall_ms = package->clock.wall_ms(timing_t::STAGE_TRACKING);
   package->clock.set(timing_t::STAGE_TRACKING, cpu_ms, wall_ms);
   package->clock.set(timing_t::STAGE_FRAME, cpu_ms, wall_ms);
+  ends_.mapping->add_times_to(&package->clock);
   package->chance.age_us = std::llround(1e6 * std::max(0.0, steady_s() - package->due_s));
   const FrameOutput& frame = ends_.reporter->report(package, ends_.outputs->counts());
   state_.store(frame.result.state, std::memory_order_relaxed);

@@ -40,7 +40,8 @@ struct ThreadHooks {
 
 struct PipelineOptions {
   int width_px = 0, height_px = 0;
-  double rate_hz = 0;  // of the images, at the run's pace; 0: unknown
+  std::size_t second_pixels = 0;  // of the second camera's images; 0: one camera
+  double rate_hz = 0;             // of the images, at the run's pace; 0: unknown
   // A camera: after this silence, or when the source has lost its camera, 'no_camera' is published at the
   // rate of the status. 0: a recording, which has gaps of its own.
   double no_camera_after_s = 0;

@@ -63,6 +63,7 @@ void TrackingLoop::track(CapturedImage* image, FramePackage* package) {
   package->result = estimator_.track(input);
   package->counts = estimator_.counts();
   package->in = image->in;
+  package->camera = image->camera;
   package->due_s = image->due_s;
   package->progress = image->progress;
   package->clock.new_frame();

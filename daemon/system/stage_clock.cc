@@ -114,6 +114,13 @@ void StageClock::forget(int stage) {
   wall_ms_.at(static_cast<std::size_t>(stage)) = -1.0;
 }
 
+void StageClock::add(int stage, const StageClock& other) {
+  const auto i = static_cast<std::size_t>(stage);
+  if (other.cpu_ms_.at(i) < 0.0) return;
+  cpu_ms_.at(i) = std::max(cpu_ms_.at(i), 0.0) + other.cpu_ms_.at(i);
+  wall_ms_.at(i) = std::max(wall_ms_.at(i), 0.0) + other.wall_ms_.at(i);
+}
+
 bool is_late(std::int64_t age_us, double deadline_ms) {
   return deadline_ms > 0.0 && 1e-3 * static_cast<double>(age_us) > deadline_ms;
 }

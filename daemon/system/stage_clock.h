@@ -51,6 +51,8 @@ class StageClock final : public slam::StageListener {
     cpu_ms_.at(static_cast<std::size_t>(stage)) = cpu_ms;
     wall_ms_.at(static_cast<std::size_t>(stage)) = wall_ms;
   }
+  // Adds the times of `stage` in another clock; no effect where the stage did not run there.
+  void add(int stage, const StageClock& other);
   // age_us: from the frame's due time to its output; 0 without a common clock. deadline_ms: 0 for none.
   [[nodiscard]] timing_t message(std::int64_t utime, std::int64_t sequence, std::int64_t age_us,
                                  double deadline_ms) const;

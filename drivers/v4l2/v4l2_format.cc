@@ -157,7 +157,7 @@ Candidates find_candidates(V4l2System* system, const V4l2Node& node, const Camer
     if (!is_wanted(known, options) || !is_enumerated(system, node, known.code)) continue;
     if (!may_have_size(system, node, known.code, options)) continue;
     const double fastest = fastest_hz(system, node, known.code, options);
-    const bool reached = fastest <= 0.0 || fastest >= kRateTolerance * options.rate_hz;
+    const bool reached = OfferedFormat{known.format, fastest}.reaches(options.rate_hz);
     all[count++] = {&known, fastest, reached ? 0.0 : options.rate_hz - fastest};
   }
   // By insertion: the standard stable sort takes memory.
@@ -168,6 +168,10 @@ Candidates find_candidates(V4l2System* system, const V4l2Node& node, const Camer
 }
 
 }  // namespace
+
+bool OfferedFormat::reaches(double rate_hz) const {
+  return fastest_hz <= 0.0 || fastest_hz >= kRateTolerance * rate_hz;
+}
 
 std::uint32_t V4l2Node::buffer_type() const {
   return multiplanar ? V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE : V4L2_BUF_TYPE_VIDEO_CAPTURE;

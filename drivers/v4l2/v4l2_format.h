@@ -31,6 +31,9 @@ struct AgreedFormat {
 struct OfferedFormat {
   CameraFormat format = CameraFormat::kAuto;
   double fastest_hz = 0;  // at the options' size; 0: unknown
+
+  // True where the driver's lists allow the rate, and where they hold none.
+  [[nodiscard]] bool reaches(double rate_hz) const;
 };
 
 // The format that agree_on_format() tries first. Sets nothing. Returns and *what as there.

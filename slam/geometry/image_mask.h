@@ -13,6 +13,9 @@ namespace farpoint::slam {
 // Immutable after construction: any thread may ask.
 class ImageMask {
  public:
+  // Largest masked share of an image: what is left of a smaller rest carries no pose.
+  static constexpr double kMostShare = 0.9;
+
   // `pixels`: rows without gaps, row by row from the top; 0 is masked, every other value is not.
   // Precondition: width_px * height_px of them, both sides positive.
   ImageMask(int width_px, int height_px, std::span<const std::uint8_t> pixels);

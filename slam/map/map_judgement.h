@@ -30,6 +30,7 @@ struct MapJudgement {
   double sound_s = kSoundTime_s;          // time of sound adjustments up to adjusted_utime
   std::int64_t adjusted_utime = 0;        // of the newest keyframe of the last adjustment
   double scale_change = 1.0;              // factor of the unit by the last adjustment
+  double further_sigma_factor = 1.0;      // of the further cameras' measurements (mapping/further_trust.h)
   Refusal unsound{};                      // what the last adjustment left too much of
   WheelTrust wheels = WheelTrust::kNone;
   double wheel_factor = 1.0;  // metres driven in one that the wheels tell

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/mapping/calibrator.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "slam/mapping/window_equations.h"
 
@@ -12,10 +12,6 @@ namespace farpoint::slam {
 namespace {
 
 constexpr int kParameters = 4;
-// Of what windows said, this share is remembered from one to the next, about 50 windows. Each spoke of a map
-// that the calibration of its day had bent; kept for good, the first of them would outvote all that come
-// later.
-constexpr double kRemembered = 0.98;
 using Vector4 = Eigen::Vector4d;
 
 class CameraModelOfWindow {
@@ -43,10 +39,8 @@ class CameraModelOfWindow {
   const int index_;  // of camera_ in the rig
 };
 
-Eigen::Matrix4d prior_information(const CalibrationConfig& config) {
-  const Vector4 sigma(config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px,
-                      config.distortion_sigma);
-  return sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+Vector4 prior_sigma(const CalibrationConfig& config) {
+  return {config.focal_sigma, config.centre_sigma_px, config.centre_sigma_px, config.distortion_sigma};
 }
 
 }  // namespace
@@ -83,40 +77,7 @@ Camera refined_camera(const Camera& given, const CalibrationDelta& delta) {
 }
 
 Calibrator::Calibrator(const CalibrationConfig& config, const Camera& given, int index)
-    : config_(config),
-      given_(given),
-      index_(index),
-      camera_(given),
-      prior_(prior_information(config)),
-      information_(prior_) {}
-
-CalibrationDelta Calibrator::sigma() const {
-  return information_.inverse().diagonal().cwiseSqrt();
-}
-
-double Calibrator::surprise() const {
-  const Eigen::Matrix4d of_images = information_ - prior_;
-  const Eigen::Matrix4d covariance = of_images + of_images * prior_.inverse() * of_images;
-  return std::sqrt(std::max(0.0, information_vector_.dot(covariance.ldlt().solve(information_vector_))));
-}
-
-CalibrationDelta Calibrator::wanted_by_images() const {
-  const Eigen::Matrix4d of_images = information_ - prior_;
-  const CalibrationDelta wanted = of_images.ldlt().solve(information_vector_);
-  return wanted.allFinite() ? wanted : CalibrationDelta::Zero();
-}
-
-Calibrator::Quadratic Calibrator::window_information(
-    const BundleProblem& problem, const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const {
-  Quadratic out;
-  const CameraModelOfWindow model(camera_, index_);
-  WindowEquations equations(problem, model);
-  for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
-  if (!equations.reduce(&out.H, &out.g)) return out;
-  out.H = (0.5 * (out.H + out.H.transpose())).eval();
-  out.usable = out.H.allFinite() && out.g.allFinite();
-  return out;
-}
+    : config_(config), given_(given), index_(index), estimate_(prior_sigma(config)), camera_(given) {}
 
 double image_change_px(const Camera& from, const Camera& to) {
   // Largest move of a ray's pixel over the image's edge.
@@ -135,28 +96,18 @@ double image_change_px(const Camera& from, const Camera& to) {
 
 bool Calibrator::update(const BundleProblem& problem,
                         const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) {
-  int free = 0;
-  for (const auto& pose : problem.poses) free += pose.fixed ? 0 : 1;
+  const int free = problem.free_poses();
   if (free < config_.min_keyframes) return false;
-  Quadratic q = window_information(problem, d_bearing);
-  if (!q.usable) return false;
-  // Residuals are not independent (one patch, one wrong assumption about its surface): count them for less.
-  q.H *= config_.information_share;
-  q.g *= config_.information_share;
-  const Eigen::Matrix4d total = information_ + q.H;
-  const Vector4 right = information_vector_ + q.H * delta_ - q.g;
-  const Vector4 best = total.ldlt().solve(right);
-  if (!best.allFinite()) return false;
-  // Kept: the share of this window that no later window will see again; what was kept before fades.
-  information_ = prior_ + kRemembered * (information_ - prior_) + q.H / free;
-  information_vector_ = kRemembered * information_vector_ + (q.H * delta_ - q.g) / free;
-  constexpr double kContradicts = 5.0, kAgrees = 3.0;
-  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
-  constexpr double kNoticeable_px = 0.05;
-  const Camera next = refined_camera(given_, best);
+  Eigen::Matrix4d H;
+  Vector4 g;
+  const CameraModelOfWindow model(camera_, index_);
+  if (!window_information(problem, d_bearing, model, config_.information_share, &H, &g)) return false;
+  const std::optional<Vector4> best = estimate_.take(H, g, free);
+  if (!best) return false;
+  const Camera next = refined_camera(given_, *best);
   if (image_change_px(camera_, next) < kNoticeable_px) return false;
   if (!Camera::check(next.parameters()).empty()) return false;
-  delta_ = best;
+  estimate_.use(*best);
   camera_ = next;
   return true;
 }

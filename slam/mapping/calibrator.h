@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "slam/config.h"
+#include "slam/mapping/calibration_estimate.h"
 #include "slam/solver/bundle_problem.h"
 
 namespace farpoint::slam {
@@ -40,41 +41,21 @@ class Calibrator {
   bool update(const BundleProblem& problem,
               const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing_d_pixel);
 
-  [[nodiscard]] const CalibrationDelta& delta() const { return delta_; }
-  // 1 sigma of delta.
-  [[nodiscard]] CalibrationDelta sigma() const;
-  // How far what the images alone want lies from the given calibration, in standard deviations (Mahalanobis):
-  // of the images' information and the prior's together. A tight prior hides nothing from it, as it does from
-  // delta(), which hardly moves then.
-  [[nodiscard]] double surprise() const;
-  // What the images alone want, without the prior.
-  [[nodiscard]] CalibrationDelta wanted_by_images() const;
-  // True where the images say that the given calibration is of another camera, focus or resolution: what is
-  // that far off has not been refined, only bent towards what fits. From 5 sigma, and until 3: the
-  // recordings' right calibrations were never further off than 1.8, a focal length that is 10 % wrong is 8
-  // off.
-  [[nodiscard]] bool contradicts_given() const { return contradicts_given_; }
+  // As CalibrationEstimate.
+  [[nodiscard]] const CalibrationDelta& delta() const { return estimate_.delta(); }
+  [[nodiscard]] CalibrationDelta sigma() const { return estimate_.sigma(); }
+  [[nodiscard]] double surprise() const { return estimate_.surprise(); }
+  [[nodiscard]] CalibrationDelta wanted_by_images() const { return estimate_.wanted_by_images(); }
+  [[nodiscard]] bool contradicts_given() const { return estimate_.contradicts_given(); }
   [[nodiscard]] const Camera& camera() const { return camera_; }
   [[nodiscard]] int camera_index() const { return index_; }
 
  private:
-  struct Quadratic {
-    Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d g = Eigen::Vector4d::Zero();  // gradient at the present delta
-    bool usable = false;
-  };
-  [[nodiscard]] Quadratic window_information(const BundleProblem& problem,
-                                             const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) const;
-
   CalibrationConfig config_;
   Camera given_;
   int index_;  // in the rig
-  CalibrationDelta delta_ = CalibrationDelta::Zero();
-  Camera camera_;  // given_ changed by delta_
-  bool contradicts_given_ = false;
-  // What is kept: information matrix and vector, the prior included.
-  Eigen::Matrix4d prior_, information_;
-  Eigen::Vector4d information_vector_ = Eigen::Vector4d::Zero();
+  CalibrationEstimate<4> estimate_;
+  Camera camera_;  // given_ changed by the estimate
 };
 
 }  // namespace farpoint::slam

@@ -218,7 +218,7 @@ std::shared_ptr<const LocalView> Mapper::refine() {
 
 bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   const StageSpan span(listener_, Stage::kLocalBa);
-  window_.build(centre);
+  window_.build(centre, settling_.further_sigma_factor());
   BundleProblem& problem = window_.problem();
   if (problem.points.empty()) return false;
   if (motion_ != nullptr) motion_->add_to(map_, window_.pose_index(), settling_.judgement(), &problem);

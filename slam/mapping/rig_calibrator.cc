@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/mapping/rig_calibrator.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "slam/mapping/window_equations.h"
 
@@ -17,9 +16,8 @@ constexpr int kRotation = 2;    // first of its three parameters
 constexpr int kDistortion = 3;  // in CalibrationDelta
 // Error of the rotation between the cameras in a good calibration: a tenth of a degree, 1 sigma.
 constexpr double kRotationSigma_rad = 0.002;
-// As Calibrator.
-constexpr double kRemembered = 0.98;
-constexpr double kNoticeable_px = 0.05;
+// Three keyframes separate the rotation between the cameras from depth.
+constexpr int kLeastKeyframes = 3;
 
 class RigModelOfWindow {
  public:
@@ -65,21 +63,7 @@ Eigen::Matrix<double, RigCalibrator::kSize, 1> prior_sigma(const CalibrationConf
 }  // namespace
 
 RigCalibrator::RigCalibrator(const CalibrationConfig& config, const Rig& given)
-    : config_(config),
-      given_(given),
-      rig_(given),
-      prior_(prior_sigma(config).cwiseAbs2().cwiseInverse().asDiagonal()),
-      information_(prior_) {}
-
-RigCalibrator::Delta RigCalibrator::sigma() const {
-  return information_.inverse().diagonal().cwiseSqrt();
-}
-
-double RigCalibrator::surprise() const {
-  const Square of_images = information_ - prior_;
-  const Square covariance = of_images + of_images * prior_.inverse() * of_images;
-  return std::sqrt(std::max(0.0, information_vector_.dot(covariance.ldlt().solve(information_vector_))));
-}
+    : config_(config), given_(given), rig_(given), estimate_(prior_sigma(config)) {}
 
 Rig RigCalibrator::changed(const Delta& delta) const {
   Rig rig = given_;
@@ -96,28 +80,15 @@ Rig RigCalibrator::changed(const Delta& delta) const {
 
 bool RigCalibrator::update(const BundleProblem& problem,
                            const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing) {
-  const auto free = std::count_if(problem.poses.begin(), problem.poses.end(),
-                                  [](const BundleProblem::Pose& pose) { return !pose.fixed; });
-  if (free < config_.min_keyframes) return false;
-  const RigModelOfWindow model(rig_);
-  WindowEquations equations(problem, model);
-  for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
-  Square H;
+  const int free = problem.free_poses();
+  if (free < kLeastKeyframes) return false;
+  Eigen::Matrix<double, kSize, kSize> H;
   Delta g;
-  if (!equations.reduce(&H, &g) || !H.allFinite() || !g.allFinite()) return false;
-  H = (0.5 * config_.information_share * (H + H.transpose())).eval();
-  g *= config_.information_share;
-  const Square total = information_ + H;
-  const Delta right = information_vector_ + H * delta_ - g;
-  const Delta best = total.ldlt().solve(right);
-  if (!best.allFinite()) return false;
-  // Kept: the share of this window that no later window will see again; what was kept before fades.
-  const auto windows = static_cast<double>(free);
-  information_ = prior_ + kRemembered * (information_ - prior_) + H / windows;
-  information_vector_ = kRemembered * information_vector_ + (H * delta_ - g) / windows;
-  constexpr double kContradicts = 5.0, kAgrees = 3.0;
-  contradicts_given_ = surprise() > (contradicts_given_ ? kAgrees : kContradicts);
-  const Rig next = changed(best);
+  const RigModelOfWindow model(rig_);
+  if (!window_information(problem, d_bearing, model, config_.information_share, &H, &g)) return false;
+  const std::optional<Delta> best = estimate_.take(H, g, free);
+  if (!best) return false;
+  const Rig next = changed(*best);
   double change_px = 0.0;
   for (std::size_t c = 0; c < kCameras; ++c) {
     if (!Camera::check(next.cameras[c].camera.parameters()).empty()) return false;
@@ -128,7 +99,7 @@ bool RigCalibrator::update(const BundleProblem& problem,
           .norm();
   change_px = std::max(change_px, turned_rad * rig_.cameras[kSecond].camera.focal_px());
   if (change_px < kNoticeable_px) return false;
-  delta_ = best;
+  estimate_.use(*best);
   rig_ = next;
   return true;
 }

@@ -36,24 +36,18 @@ class RigCalibrator {
               const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing_d_pixel);
 
   [[nodiscard]] const Rig& rig() const { return rig_; }
-  [[nodiscard]] const Delta& delta() const { return delta_; }
-  // 1 sigma of delta.
-  [[nodiscard]] Delta sigma() const;
-  // As Calibrator: the images alone want another rig, further off than 5 sigma, and until 3.
-  [[nodiscard]] double surprise() const;
-  [[nodiscard]] bool contradicts_given() const { return contradicts_given_; }
+  // As CalibrationEstimate.
+  [[nodiscard]] const Delta& delta() const { return estimate_.delta(); }
+  [[nodiscard]] Delta sigma() const { return estimate_.sigma(); }
+  [[nodiscard]] double surprise() const { return estimate_.surprise(); }
+  [[nodiscard]] bool contradicts_given() const { return estimate_.contradicts_given(); }
 
  private:
-  using Square = Eigen::Matrix<double, kSize, kSize>;
-
   [[nodiscard]] Rig changed(const Delta& delta) const;
 
   CalibrationConfig config_;
-  Rig given_, rig_;  // rig_: given_ changed by delta_
-  Delta delta_ = Delta::Zero();
-  bool contradicts_given_ = false;
-  Square prior_, information_;  // what is kept, the prior included
-  Delta information_vector_ = Delta::Zero();
+  Rig given_, rig_;  // rig_: given_ changed by the estimate
+  CalibrationEstimate<kSize> estimate_;
 };
 
 }  // namespace farpoint::slam

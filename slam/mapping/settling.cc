@@ -11,6 +11,7 @@ void Settling::start_map() {
   judgement_ = {};
   judgement_.sound_s = sound_s;
   soundness_ = {};
+  further_.start_map();
   steady_run_ = 0;
   has_adjustment_ = false;
 }
@@ -23,6 +24,8 @@ void Settling::start_metric_map() {
 void Settling::note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
                                bool calibration_contradicted, std::int64_t utime) {
   soundness_ = soundness;
+  further_.note_adjustment(soundness, utime);
+  judgement_.further_sigma_factor = further_.sigma_factor();
   if (!scale_change) return;
   MapJudgement& j = judgement_;
   const double gap_s =

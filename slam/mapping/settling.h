@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "slam/map/map_judgement.h"
+#include "slam/mapping/further_trust.h"
 #include "slam/mapping/soundness.h"
 #include "slam/solver/motion_factors.h"
 
@@ -34,6 +35,8 @@ class Settling {
   // Takes in what another sensor says. Its metre is the map's unit from here on.
   void note_motion(const MotionVerdict& verdict);
 
+  // Of the further cameras' sigmas.
+  [[nodiscard]] double further_sigma_factor() const { return judgement_.further_sigma_factor; }
   [[nodiscard]] const MapJudgement& judgement() const { return judgement_; }
   // Whether map units are metres.
   [[nodiscard]] bool metric() const { return judgement_.metric; }
@@ -44,6 +47,7 @@ class Settling {
 
  private:
   Soundness soundness_;
+  FurtherTrust further_;
   MapJudgement judgement_;
   int steady_run_ = 0;
   bool has_adjustment_ = false;  // of this map

@@ -54,6 +54,22 @@ FieldSize size_of(const Field& field) {
   return size;
 }
 
+// Over views.
+struct FieldSums {
+  double field_px2 = 0, measurements = 0, sigma_px2 = 0;
+  int fields = 0;
+
+  void add(double square_px2, double count, double variance_px2) {
+    field_px2 += square_px2;
+    measurements += count;
+    sigma_px2 += variance_px2;
+    ++fields;
+  }
+  [[nodiscard]] double field_px() const {
+    return fields > 0 ? std::sqrt(std::max(field_px2 / fields, 0.0)) : 0.0;
+  }
+};
+
 Eigen::Vector3d place_of(const BundleProblem& problem, const BundleProblem::Measurement& m) {
   const Camera& camera = problem.rig->cameras[static_cast<std::size_t>(m.camera)].camera;
   const double half_width_px = 0.5 * camera.width_px(), half_height_px = 0.5 * camera.height_px();
@@ -80,8 +96,10 @@ Residuals residuals_of(const BundleProblem& problem) {
       const auto pose = static_cast<std::size_t>(m.pose);
       // The host's own sighting has no residual: the landmark lies on its ray.
       if (m.pose == point.host || problem.poses[pose].fixed) continue;
-      sums.weight += point.weight;
-      sums.chi2 += point.weight * std::min(m.chi2, kLargestChi2);
+      if (m.camera == 0) {
+        sums.weight += point.weight;
+        sums.chi2 += point.weight * std::min(m.chi2, kLargestChi2);
+      }
       Eigen::Vector2d residual;
       if (m.chi2 <= kChi2TwoDof && residual_world(world, frames.view(m), m, &residual))
         sums.fields[pose * cameras + static_cast<std::size_t>(m.camera)].add(place_of(problem, m), residual,
@@ -129,23 +147,31 @@ Soundness soundness_of(const BundleProblem& problem) {
   Soundness s;
   s.mean_chi2 = mean_chi2_of(problem);
   const Residuals residuals = residuals_of(problem);
-  double weight = 0.0, variance = 0.0, variance_px2 = 0.0, field_px2 = 0.0;
-  int fields = 0;
-  for (const Field& field : residuals.fields) {
+  const std::size_t cameras = problem.rig->cameras.size();
+  double weight = 0.0, variance = 0.0, variance_px2 = 0.0;
+  FieldSums first, further;
+  for (std::size_t i = 0; i < residuals.fields.size(); ++i) {
+    const Field& field = residuals.fields[i];
     if (field.measurements() < kLeastMeasurements) continue;
     const FieldSize size = size_of(field);
     const double sigma_px2 = field.variance_px2 / field.weight;
+    const bool of_first = i % cameras == 0;
+    (of_first ? first : further).add(size.square * sigma_px2, field.measurements(), sigma_px2);
+    if (!of_first) continue;
     weight += field.weight;
     variance += field.weight * size.variance;
     variance_px2 += field.weight * size.variance * sigma_px2;
-    field_px2 += size.square * sigma_px2;
-    ++fields;
   }
-  if (fields == 0 || variance <= 0.0) return s;
+  if (weight <= 0.0 || variance <= 0.0) return s;
   const double noise2 = variance / weight / kInlierVariance;
   s.noise_sigmas = std::sqrt(noise2);
   s.noise_px = std::sqrt(variance_px2 / weight / kInlierVariance);
-  s.field_px = std::sqrt(std::max(field_px2 / fields, 0.0));
+  s.field_px = first.field_px();
+  s.further_field_px = further.field_px();
+  if (further.fields > 0) {
+    s.further_measurements = further.measurements / further.fields;
+    s.further_sigma_px = std::sqrt(further.sigma_px2 / further.fields);
+  }
   s.excess = residuals.chi2 / residuals.weight / (2.0 * noise2);
   return s;
 }

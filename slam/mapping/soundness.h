@@ -10,6 +10,8 @@
 namespace farpoint::slam {
 
 struct Soundness {
+  // Noise, excess and field are those of the first camera, which holds the map's shape.
+  //
   // Mean of the measurements' chi2 (two degrees of freedom; each cut off at kLargestChi2), each with the
   // weight of its point in the adjustment. Tells how large the residuals are in claimed sigmas.
   double mean_chi2 = 0;
@@ -19,10 +21,15 @@ struct Soundness {
   // Chi2 a degree of freedom, by that noise: 1 for errors of a normal distribution, more where the scene
   // moves or matches are wrong.
   double excess = 0;
-  // RMS in pixels of an affine field over the image, in the residuals of the free keyframes; what independent
-  // errors give by chance is taken off. Errors of patches are independent of each other, those of a camera
-  // are a field. Does not depend on the number of measurements. 0 where no keyframe has enough of them.
+  // RMS in pixels of an affine field over the first camera's image, in the residuals of the free keyframes;
+  // what independent errors give by chance is taken off. Errors of patches are independent of each other,
+  // those of a camera are a field. Does not depend on the number of measurements. 0 where no keyframe has
+  // enough of them.
   double field_px = 0;
+  // The same of further cameras' views, and how many measurements a view has: what those share.
+  double further_field_px = 0, further_measurements = 0;
+  // Claimed, RMS, px.
+  double further_sigma_px = 0;
 
   // Why the map's poses cannot be called valid; no reason where they can. What held before may waver.
   [[nodiscard]] Refusal refusal(bool held_before) const;

@@ -38,7 +38,8 @@ Window::Window(const EstimatorConfig& config, Map* map, MappingCounts* counts)
                      static_cast<std::size_t>(config.mapping.window_sightings));
 }
 
-void Window::build(KeyframeHandle centre) {
+void Window::build(KeyframeHandle centre, double further_sigma_factor) {
+  further_sigma_factor_ = further_sigma_factor;
   problem_.clear();
   problem_.rig = &map_.rig();
   pose_index_.assign(map_.keyframes().capacity(), -1);
@@ -140,7 +141,7 @@ void Window::add_point(const Landmark& l) {
     m.pose = pose_index_[o.keyframe.index];
     m.camera = o.camera;
     m.pixel = o.pixel.cast<double>();
-    m.sigma_px = o.sigma_px;
+    m.sigma_px = o.camera == 0 ? o.sigma_px : further_sigma_factor_ * o.sigma_px;
     problem_.measurements.push_back(m);
   }
   point.measurements = static_cast<int>(problem_.measurements.size()) - point.first_measurement;

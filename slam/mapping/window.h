@@ -22,7 +22,8 @@ class Window {
   Window(const EstimatorConfig& config, Map* map, MappingCounts* counts);
 
   // Builds the problem around `centre`, within the limits of MappingConfig. Precondition: `centre` is alive.
-  void build(KeyframeHandle centre);
+  // `further_sigma_factor`: of the sigmas of further cameras' measurements (FurtherTrust).
+  void build(KeyframeHandle centre, double further_sigma_factor = 1.0);
 
   // To be solved in place. Poses: those of keyframes() in their order, then fixed ones.
   [[nodiscard]] BundleProblem& problem() { return problem_; }
@@ -64,6 +65,7 @@ class Window {
   Map& map_;
   MappingCounts& counts_;
   BundleProblem problem_;
+  double further_sigma_factor_ = 1.0;
   std::vector<KeyframeHandle> keyframes_;  // of the free poses
   std::vector<LandmarkHandle> landmarks_;
   std::vector<int> pose_index_;  // by keyframe slot: index in problem_.poses, or -1

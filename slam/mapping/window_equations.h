@@ -11,6 +11,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 #include "slam/geometry/robust.h"
@@ -182,5 +183,21 @@ class WindowEquations {
   Part part_;
   std::vector<Coupling> couplings_;
 };
+
+// Information matrix and gradient of the calibration by one window, its poses free. d_bearing: as
+// Calibrator::update. Residuals are not independent (one patch, one wrong assumption about its surface): they
+// count as `share` of as many. False where the window determines nothing.
+template <typename Model>
+bool window_information(const BundleProblem& problem,
+                        const std::vector<Eigen::Matrix<double, 3, 2>>& d_bearing, const Model& model,
+                        double share, typename WindowEquations<Model>::Square* H,
+                        typename WindowEquations<Model>::Vector* g) {
+  WindowEquations<Model> equations(problem, model);
+  for (std::size_t k = 0; k < problem.points.size(); ++k) equations.add(problem.points[k], d_bearing[k]);
+  if (!equations.reduce(H, g) || !H->allFinite() || !g->allFinite()) return false;
+  *H = (0.5 * share * (*H + H->transpose())).eval();
+  *g *= share;
+  return true;
+}
 
 }  // namespace farpoint::slam

@@ -8,6 +8,7 @@
 // costs of the factors.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -47,6 +48,10 @@ struct BundleProblem {
   std::vector<GlobalState> globals;
   std::vector<const StateFactor*> factors;  // owned by the caller
 
+  [[nodiscard]] int free_poses() const {
+    return static_cast<int>(
+        std::count_if(poses.begin(), poses.end(), [](const Pose& pose) { return !pose.fixed; }));
+  }
   [[nodiscard]] StateWindow states() const { return {poses, motions, globals}; }
   void clear() {
     poses.clear();

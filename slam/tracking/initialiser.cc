@@ -24,6 +24,16 @@ constexpr double kTurn_rad = 0.02;
 // A frame that comes a little early counts as in time.
 constexpr double kEarly_s = 0.001;
 
+// By the motion that most matches agree with; without any there is no share to name.
+Refusal poor_model(const TwoViewResult& motion) {
+  const TwoViewOptions options;
+  const auto agreeing = static_cast<double>(std::max(motion.inliers, motion.essential_inliers));
+  if (agreeing <= 0.0) return {.reason = Reason::kNoCommonMotion};
+  const auto matches = static_cast<double>(motion.matches);
+  return {Reason::kNoCommonMotion, agreeing / matches,
+          std::max(options.min_inlier_share, static_cast<double>(options.min_inliers) / matches)};
+}
+
 }  // namespace
 
 Initialiser::Initialiser(const EstimatorConfig& config, const Rig& rig, int camera)
@@ -159,10 +169,7 @@ Refusal Initialiser::refusal_of(const TwoViewResult& motion) {
     case TwoViewStatus::kAmbiguous:
       return {.reason = Reason::kAmbiguousStart};
     case TwoViewStatus::kPoorModel:
-      return {
-          Reason::kNoCommonMotion,
-          static_cast<double>(motion.inliers) / static_cast<double>(std::max<std::size_t>(motion.matches, 1)),
-          TwoViewOptions{}.min_inlier_share};
+      return poor_model(motion);
     case TwoViewStatus::kOk:
       break;
   }

@@ -30,6 +30,7 @@ std::size_t PoseRefiner::bytes() const {
 PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& prior) {
   const StageSpan span(listener_, Stage::kPose);
   measurements_.clear();
+  const double further_sigma_factor = matcher_.view()->judgement.further_sigma_factor;
   for (const Match& m : matcher_.matches()) {
     const ViewLandmark& l = matcher_.landmark_of(m);
     PoseMeasurement pm;
@@ -37,7 +38,7 @@ PoseSolution PoseRefiner::solve(const SE3& T_world_body_start, const PosePrior& 
     pm.anchor_w = l.anchor_w;
     pm.inverse_depth_sigma = l.inverse_depth_sigma;
     pm.pixel = m.pixel.cast<double>();
-    pm.sigma_px = m.sigma_px;
+    pm.sigma_px = m.further ? further_sigma_factor * m.sigma_px : m.sigma_px;
     pm.camera = m.camera;
     measurements_.push_back(pm);
   }

@@ -23,7 +23,7 @@ MARK = re.compile(r"^<!-- (?:run in (?P<scenario>\w+)|not run: (?P<reason>.+)) -
 NOT_RUN = ("kalibr_calibrate_cameras ", "rosrun ", "ros2 run ", "v4l2-ctl ", "tools/deps ", "cmake ", "export PATH", "cp car/", "systemctl ",
            "journalctl ", "farpoint top", "farpointd --config farpoint.yaml --set camera.device=usb:1-1 ",
            "farpointd --check --config farpoint.yaml --set camera.device=usb:1-1 ")
-PICTURES, RATE_HZ = 240, 10
+PICTURES, RATE_HZ, KITTI_SIZE = 240, 10, (1242, 375)
 
 
 class Failed(Exception):
@@ -59,6 +59,24 @@ def commands(block):
     return block.replace("\\\n", " ").splitlines()
 
 
+# What a reader may bring, and the log that its import makes.
+SOURCES = {"drive": "drive.lcm", "drive.mp4": "from_video.lcm", "drive.bag": "from_bag.lcm", "drive.mcap": "from_mcap.lcm",
+           "drive.db3": "from_db3.lcm"}
+
+
+def from_bare_debian(page, source):
+    """The commands from a clone and such a source to the report: set-up, import, check, replay, report."""
+    found = blocks(page)
+    setup = [command for _, reason, block in found if "tools/test" in (reason or "") for command in commands(block)]
+    chain = commands(next(block for _, _, block in found if "path.tum" in block))
+    if source == "drive":
+        return setup + chain
+    named = f"farpoint import {'video' if source.endswith('mp4') else 'bag'} {source} "
+    own = next(command for _, _, block in found for command in commands(block)
+               if command.startswith(named) and "--list" not in command)
+    return [*setup, own, *(command.replace("drive.lcm", SOURCES[source]) for command in chain[1:])]
+
+
 def check_page(page, source):
     found = blocks(page)
     named = {scenario for scenario, _, _ in found if scenario}
@@ -68,9 +86,9 @@ def check_page(page, source):
             expect(command.startswith(NOT_RUN), f"'{command}' is not run ({reason}), and could be")
     results = json.loads((source / "tests/results/bench.json").read_text())
     check_figures(page, results)
-    most = sum(len(commands(block)) for scenario, reason, block in found if "tools/test" in (reason or ""))
-    most += len(commands(next(block for scenario, _, block in found if "path.tum" in block)))
-    expect(most <= 7, f"{most} commands from a bare Debian to the report, expected at most 7")
+    for source in SOURCES:
+        most = len(from_bare_debian(page, source))
+        expect(most <= 7, f"{most} commands from a bare Debian and {source} to the report, expected at most 7")
 
 
 def check_figures(page, results):
@@ -135,34 +153,56 @@ def expect_report(file):
 
 
 def lens_of_kitti(reader):
-    return stand_ins.kitti_lens(reader.recording(stand_ins.KITTI), (1242, 375))
+    return stand_ins.kitti_lens(reader.recording(stand_ins.KITTI), KITTI_SIZE)
 
 
-def prepare_recording(reader, count=PICTURES):
-    where, lens = reader.folder, lens_of_kitti(reader)
-    pictures = stand_ins.link_pictures(reader.recording(stand_ins.KITTI) / "image_0", where / "drive", count)
+def bring_recording(recordings, where, count=PICTURES):
+    """A folder of pictures with ROS' calibration, and the same as film and as bags."""
+    recording = recordings / stand_ins.KITTI
+    lens = stand_ins.kitti_lens(recording, KITTI_SIZE)
+    pictures = stand_ins.link_pictures(recording / "image_0", where / "drive", count)
     (where / "ost.yaml").write_text(stand_ins.ros_calibration(lens))
     (where / "board-camchain.yaml").write_text(stand_ins.kalibr_chain(lens))
     (where / "drive.bag").write_bytes(stand_ins.bag_of(pictures, lens, RATE_HZ))
     (where / "drive.mcap").write_bytes(stand_ins.mcap_of(pictures, lens, RATE_HZ))
+    stand_ins.write_db3_of(pictures, lens, RATE_HZ, where / "drive.db3")
     stand_ins.make_video(f"{where}/drive/%06d.jpg", RATE_HZ, where / "drive.mp4")
     return where
 
 
-def check_recording(reader):
-    where = reader.folder
+def prepare_recording(reader, count=PICTURES):
+    return bring_recording(reader.recordings, reader.folder, count)
+
+
+def expect_imports(where, names):
+    """The logs hold the pictures byte for byte, a film its frames."""
     files = [path.read_bytes() for path in sorted((where / "drive").iterdir())]
     expect(len(files) == PICTURES, f"{len(files)} pictures")
-    for name in ("drive", "chain", "from_bag", "from_mcap"):
+    for name in names:
         taken = pictures_of(where / f"{name}.lcm")
         expect([pixels for _, pixels in taken] == files, f"{name}.lcm does not hold the pictures byte for byte")
         start = taken[0][0]
         expect(all(abs(utime - start - number * 1e6 / RATE_HZ) < 2 for number, (utime, _) in enumerate(taken)),
                f"the times of {name}.lcm are not {RATE_HZ} a second")
     expect_same_pictures(files, [pixels for _, pixels in pictures_of(where / "from_video.lcm")])
-    expect(poses_of(where / "path.tum") >= 0.95 * PICTURES, f"only {poses_of(where / 'path.tum')} of {PICTURES} frames have a pose")
-    expect("sensor_msgs/CompressedImage" in reader.said, "--list names no images")
+
+
+def expect_run(where):
+    """What a replay and its report left."""
+    poses = poses_of(where / "path.tum")
+    expect(poses >= 0.95 * PICTURES, f"only {poses} of {PICTURES} frames have a pose")
     expect_report(where / "report.html")
+
+
+def check_recording(reader):
+    where = reader.folder
+    expect_imports(where, ("drive", "chain", "from_bag", "from_mcap", "from_db3"))
+    expect_run(where)
+    expect("sensor_msgs/CompressedImage" in reader.said, "--list names no images")
+    expect(f"drive.lcm: {PICTURES} images in 23.9 s (10 Hz)" in reader.said, "--check does not describe the log")
+    expect("mask.png: " in reader.said and "% of the image" in reader.said, "--check does not describe the mask")
+    taken = subprocess.run(["tar", "-tzf", where / "fault.tar.gz"], capture_output=True, text=True, check=True).stdout
+    expect("hardware/processor.txt" in taken and "state/check.txt" in taken, "the bugreport lacks processor or check: " + taken)
 
 
 def expect_same_pictures(files, taken):

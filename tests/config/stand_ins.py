@@ -9,6 +9,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/tools/import"), str(ROOT / "tools/hil")]
 import write_bag  # noqa: E402
+import write_db3  # noqa: E402
 import write_mcap  # noqa: E402
 
 KITTI = "kitti/sequences/03"
@@ -98,24 +99,39 @@ def bag_of(pictures, lens, rate_hz):
     return b"#ROSBAG V2.0\n" + head + body
 
 
-def mcap_of(pictures, lens, rate_hz):
-    """An MCAP of ROS 2 with the same."""
-    topics = (("/cam0/image_raw/compressed", "sensor_msgs/msg/CompressedImage"), ("/cam0/camera_info", "sensor_msgs/msg/CameraInfo"))
-    channels = b"".join(write_mcap.channel(i, topic, kind) for i, (topic, kind) in enumerate(topics))
+ROS2_TOPICS = (("/cam0/image_raw/compressed", "sensor_msgs/msg/CompressedImage"), ("/cam0/camera_info", "sensor_msgs/msg/CameraInfo"))
+
+
+def ros2_messages(pictures, lens, rate_hz):
+    """(number of the topic, nanoseconds, CDR) of each message: camera_info, then the images."""
     k = [lens["fx"], 0, lens["cx"], 0, lens["fy"], lens["cy"], 0, 0, 1]
     p = [lens["fx"], 0, lens["cx"], 0, 0, lens["fy"], lens["cy"], 0, 0, 0, 1, 0]
-    info = (write_mcap.Cdr().header(0, "cam0").pack("I", lens["size"][1], lens["size"][0]).text("plumb_bob")
-            .pack("I", 5).pack("d", *lens["d"]).pack("d", *k).pack("d", 1, 0, 0, 0, 1, 0, 0, 0, 1).pack("d", *p)
-            .pack("I", 0, 0).pack("I", 0, 0, 0, 0).pack("B", 0).bytes())
-    records = channels + write_mcap.message(1, 0, info)
+    yield 1, 0, (write_mcap.Cdr().header(0, "cam0").pack("I", lens["size"][1], lens["size"][0]).text("plumb_bob")
+                 .pack("I", 5).pack("d", *lens["d"]).pack("d", *k).pack("d", 1, 0, 0, 0, 1, 0, 0, 0, 1).pack("d", *p)
+                 .pack("I", 0, 0).pack("I", 0, 0, 0, 0).pack("B", 0).bytes())
     for number, picture in enumerate(pictures):
         when, content = round(number * 1e9 / rate_hz), picture.read_bytes()
         cdr = write_mcap.Cdr().header(when, "cam0").text("jpeg").pack("I", len(content))
         cdr.data += content
-        records += write_mcap.message(0, when, cdr.bytes())
+        yield 0, when, cdr.bytes()
+
+
+def mcap_of(pictures, lens, rate_hz):
+    """An MCAP of ROS 2 with the same."""
+    channels = b"".join(write_mcap.channel(i, topic, kind) for i, (topic, kind) in enumerate(ROS2_TOPICS))
+    records = channels + b"".join(write_mcap.message(*message) for message in ros2_messages(pictures, lens, rate_hz))
     magic = b"\x89MCAP0\r\n"
     end = write_mcap.record(15, struct.pack("<I", 0)) + channels + write_mcap.record(2, struct.pack("<QQI", 0, 0, 0))
     return magic + write_mcap.record(1, write_mcap.text("ros2") + write_mcap.text("by hand")) + records + end + magic
+
+
+def write_db3_of(pictures, lens, rate_hz, output):
+    """The same as rosbag2's SQLite file."""
+    database = write_db3.new_bag(output, [(*topic, "cdr") for topic in ROS2_TOPICS])
+    for topic, when, data in ros2_messages(pictures, lens, rate_hz):
+        write_db3.put(database, topic + 1, when, data)
+    database.commit()
+    database.close()
 
 
 def make_video(pattern, rate_hz, output):

@@ -4,10 +4,11 @@
 # `evaluate` and the camera models have neither, since they would take most of the time.
 file(GLOB_RECURSE fuzzed CONFIGURE_DEPENDS
      ${CMAKE_SOURCE_DIR}/ipc/*.cc ${CMAKE_SOURCE_DIR}/drivers/log/*.cc ${CMAKE_SOURCE_DIR}/drivers/can/wheel_*.cc
-     ${CMAKE_SOURCE_DIR}/daemon/config/*.cc ${CMAKE_SOURCE_DIR}/tools/common/*.cc ${CMAKE_SOURCE_DIR}/tools/evaluate/*.cc
+     ${CMAKE_SOURCE_DIR}/drivers/mavlink/*.cc ${CMAKE_SOURCE_DIR}/daemon/config/*.cc ${CMAKE_SOURCE_DIR}/tools/common/*.cc ${CMAKE_SOURCE_DIR}/tools/evaluate/*.cc
      ${CMAKE_SOURCE_DIR}/tools/report/*.cc ${CMAKE_SOURCE_DIR}/tools/trajectory/*.cc ${CMAKE_CURRENT_LIST_DIR}/*.cc)
 list(FILTER fuzzed EXCLUDE REGEX "(_main|_test|/daemon/config/(options|build_info))[.]cc$")
-foreach(reader bag bag_file bag_topics byte_file chunk images mcap recording rectified_pair ros_bag ros_message sqlite_bag)
+foreach(reader bag bag_file bag_topics byte_file chunk euroc images kaist kitti mcap recording rectified_pair ros_bag ros_message sqlite_bag
+        tum zurich)
   list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/tools/import/${reader}.cc)
 endforeach()
 list(APPEND fuzzed ${CMAKE_SOURCE_DIR}/daemon/system/control_socket.cc ${CMAKE_SOURCE_DIR}/daemon/system/service_log.cc
@@ -18,6 +19,7 @@ file(GLOB_RECURSE beside CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tools/simulate/wo
      ${CMAKE_SOURCE_DIR}/tools/simulate/render/*.cc ${CMAKE_SOURCE_DIR}/tools/simulate/sensors/*.cc)
 list(REMOVE_ITEM beside ${fuzzed})
 list(APPEND beside ${CMAKE_SOURCE_DIR}/tools/simulate/simulation.cc ${CMAKE_SOURCE_DIR}/slam/geometry/camera.cc
+     ${CMAKE_SOURCE_DIR}/slam/geometry/image_mask.cc
      ${CMAKE_SOURCE_DIR}/slam/geometry/se3.cc ${CMAKE_SOURCE_DIR}/slam/frame_result.cc)
 
 set(fuzz_checks address,undefined,float-cast-overflow)
@@ -42,7 +44,7 @@ target_link_libraries(farpoint_fuzzed PUBLIC farpoint_fuzz_base farpoint_beside_
 target_link_libraries(farpoint_beside_fuzzed INTERFACE $<LINK_ONLY:farpoint_fuzzed>)
 
 add_custom_target(fuzz)
-foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps)
+foreach(name log message image config camera world dbc can control evaluate report bag db3 stamps mavlink layout)
   add_executable(fuzz_${name} EXCLUDE_FROM_ALL ${CMAKE_CURRENT_LIST_DIR}/fuzz_main.cc)
   target_compile_definitions(fuzz_${name} PRIVATE FARPOINT_FUZZ_TARGET="${name}")
   target_link_libraries(fuzz_${name} PRIVATE farpoint_fuzzed)

@@ -24,6 +24,8 @@ std::span<const Target> targets() {
       {"bag", run_bag, seeds_of_bag, 4096},
       {"db3", run_db3, seeds_of_db3, 8192},
       {"stamps", run_stamps, seeds_of_stamps, 512},
+      {"mavlink", run_mavlink, seeds_of_mavlink, 1024},
+      {"layout", run_layout, seeds_of_layout, 1024},
   };
   return all;
 }

@@ -51,6 +51,8 @@ void run_report(ByteView input);
 void run_bag(ByteView input);
 void run_db3(ByteView input);
 void run_stamps(ByteView input);
+void run_mavlink(ByteView input);
+void run_layout(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_log();
 [[nodiscard]] std::vector<Bytes> seeds_of_message();
 [[nodiscard]] std::vector<Bytes> seeds_of_image();
@@ -64,5 +66,7 @@ void run_stamps(ByteView input);
 [[nodiscard]] std::vector<Bytes> seeds_of_bag();
 [[nodiscard]] std::vector<Bytes> seeds_of_db3();
 [[nodiscard]] std::vector<Bytes> seeds_of_stamps();
+[[nodiscard]] std::vector<Bytes> seeds_of_mavlink();
+[[nodiscard]] std::vector<Bytes> seeds_of_layout();
 
 }  // namespace farpoint::fuzz

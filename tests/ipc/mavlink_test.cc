@@ -12,10 +12,13 @@
 
 #include "ipc/mavlink/messages.h"
 #include "tests/ipc/scratch.h"
+#include "tests/support/mavlink_stream.h"
 #include "tests/support/paths.h"
 
 namespace farpoint::ipc::mavlink {
 namespace {
+
+using test::parsed;
 
 constexpr int kSkipped = 77;
 
@@ -146,16 +149,6 @@ TEST(Mavlink, HeartbeatAndTimesyncAreReadByAnotherImplementation) {
   EXPECT_EQ(field(lines[2], "ts1"), "\"42\"");
   EXPECT_EQ(field(lines[2], "targetSystem"), "7");
   EXPECT_EQ(field(lines[2], "targetComponent"), "9");
-}
-
-// All messages that come out, of bytes that come in pieces.
-std::vector<Received> parsed(Parser* parser, std::span<const std::uint8_t> bytes, std::size_t piece) {
-  std::vector<Received> out;
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(parser->take(bytes.first(std::min(piece, bytes.size()))));
-    while (const auto received = parser->next()) out.push_back(*received);
-  }
-  return out;
 }
 
 TEST(Mavlink, FramesOfAnotherImplementationAreReadInAnyPieces) {

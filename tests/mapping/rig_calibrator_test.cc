@@ -141,7 +141,8 @@ TEST(RigCalibrator, FindsTheDistortionThatRectificationLeft) {
   EXPECT_LT(calibrator.delta().tail<3>().norm(), 4e-4);
 }
 
-// About its vertical axis, that is: turned about another one it shows nothing on the curves, and there is no map.
+// About its vertical axis, that is: turned about another one it shows nothing on the curves, and there is no
+// map.
 TEST(RigCalibrator, SaysThatACameraTurnedByTwoDegreesIsAnotherRig) {
   constexpr double kTwoDegrees_rad = 0.035;
   EXPECT_TRUE(refined(with_error({0.0, kTwoDegrees_rad, 0.0}, 0.0)).contradicts_given());

@@ -148,5 +148,29 @@ TEST(Soundness, MeanChiSquareHasTheWeightsOfTheAdjustment) {
   EXPECT_NEAR(soundness_of(p).mean_chi2, (10 * 0.5 + 0.1 * 100 * 2.0 + 20 * kLargestChi2) / 40.0, 1e-12);
 }
 
+// A second camera that swings on its mount: its own field shows it, and the map is judged by the first
+// camera.
+TEST(Soundness, AFurtherCameraThatMovesIsToldApart) {
+  SceneOptions options;
+  options.cameras = 2;
+  BundleScene scene(options);
+  BundleProblem& p = scene.start;
+  BundleOptions solver;
+  solver.iterations = 20;
+  for (auto& m : p.measurements)
+    if (m.camera == 1) m.pixel.x() += m.pose % 2 == 0 ? 1.0 : -1.0, m.sigma_px *= 20.0;
+  ASSERT_TRUE(solve_schur(solver, &p).usable);
+  for (auto& m : p.measurements)
+    if (m.camera == 1) m.sigma_px /= 20.0;
+  evaluate_bundle(&p);
+  for (auto& m : p.measurements)
+    if (m.camera == 1) m.chi2 = 0.0;  // all are inliers
+  const Soundness sound = soundness_of(p);
+  EXPECT_EQ(sound.refusal(false).reason, Reason::kNone);
+  EXPECT_LT(sound.field_px, 0.1);
+  EXPECT_NEAR(sound.further_field_px, 1.0, 0.2);
+  EXPECT_GT(sound.further_measurements, 30.0);
+}
+
 }  // namespace
 }  // namespace farpoint::slam

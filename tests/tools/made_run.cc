@@ -142,6 +142,10 @@ void write_run_log(const fs::path& file, const MadeRun& run) {
     pose.keyframe = i % 2 == 0 ? 1 : 0;
     set_pose(p.pose, &pose);
     if (pose.valid == 0) pose.position[0] = 1e6;  // must never be counted
+    if (run.other_map_from > 0 && i >= run.other_map_from) {
+      pose.map_id = 9;
+      pose.position[0] += 1e3;
+    }
     log.write_message(ipc::kPoseChannel, pose.utime, pose);
     write_motion(pose, &log);
     timing_t timing{};

@@ -23,6 +23,7 @@ struct MadeRun {
   bool ended = true;                         // FARPOINT_TRAJECTORY and FARPOINT_SUMMARY are there
   bool tracking_timed = true;                // else only the whole frame is
   std::size_t blind_from = 0, blind_to = 0;  // frames published without a valid pose in between
+  std::size_t other_map_from = 0;            // from this frame on another map, 1 km away; 0: never
 };
 void write_run_log(const std::filesystem::path& file, const MadeRun& run);
 

@@ -62,8 +62,8 @@ TEST(Top, ShowsStateRatesAndHealth) {
   for (const char* part :
        {"TRACKING   quality 87", "odometry 30.0 Hz   status 5.0 Hz", "x 12.34",
         "heading 90.0 deg   speed 5.00 units/s", "p50 30.0  p99 59.0  max 60.0 ms",
-        "p50 7.0  p99 7.0  max 7.0 ms", "1234 images", "5 flagged", "17 stamps of no clock",
-        "23 not recorded", "CAN       bus off", "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
+        "p50 7.0  p99 7.0  max 7.0 ms", "1234 in", "5 flagged", "17 stamps of no clock", "23 not recorded",
+        "CAN       bus off", "180 MB now", "101 MB of it pools", "0.1.0 abc"}) {
     EXPECT_TRUE(has(text, part)) << part << "\n" << text;
   }
   std::istringstream lines(text);
@@ -120,6 +120,25 @@ TEST(Top, FunctionsThatHaveNotBegunAreNamed) {
   s.side_failures = 12;
   board.take(s, 100.2);
   EXPECT_TRUE(has(board.render(100.3, false), "missing   LCM, recording   12 attempts failed\n"));
+}
+
+TEST(Top, TheCameraIsNamedWithFormatRateAndExposure) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  board.take(s, 100.0);
+  EXPECT_FALSE(has(board.render(100.1, false), "camera    "));
+  s.camera = "usb:1-1";
+  s.camera_exposure_us = -1;
+  s.camera_gain = -1.0;
+  board.take(s, 100.2);
+  EXPECT_TRUE(has(board.render(100.3, false), "camera    usb:1-1   exposure unknown\n"));
+  s.camera_format = "YUYV";
+  s.camera_rate_hz = 30.0;
+  s.camera_exposure_us = 4500;
+  s.camera_gain = 12.0;
+  board.take(s, 100.4);
+  EXPECT_TRUE(
+      has(board.render(100.5, false), "camera    usb:1-1   YUYV at 30 Hz   exposure 4.5 ms   gain 12\n"));
 }
 
 TEST(Top, ADaemonThatFellSilentIsSaidInRed) {

@@ -91,6 +91,33 @@ TEST_F(InitialiserTest, AnotherPlaceBecomesTheReference) {
   EXPECT_EQ(pair->first, frames[1].frame);
 }
 
+// Each point goes its own way: by up to `share` of its distance, in any direction.
+void scatter(std::vector<ScenePoint>* points, double share) {
+  std::uint64_t random = 1;
+  for (ScenePoint& p : *points) {
+    const double distance = p.position_w.norm();
+    for (double& x : p.position_w) {
+      random = random * 6364136223846793005ULL + 1442695040888963407ULL;
+      x += share * distance * (static_cast<double>(random >> 40) / (1 << 23) - 1.0);
+    }
+  }
+}
+
+TEST_F(InitialiserTest, NamesTheShareThatAgreesOnlyWhereAMotionWasFound) {
+  for (const double share : {0.03, 0.05, 0.08, 0.12, 0.2}) {
+    initialiser.emplace(scene.config, scene.rig);
+    frames.clear();
+    (void)add(aside(0));
+    scatter(&scene.points, share);
+    EXPECT_FALSE(add(aside(0)).has_value()) << share;
+    const Refusal refusal = initialiser->refusal();
+    EXPECT_EQ(refusal.reason, Reason::kNoCommonMotion) << share;
+    if (std::isnan(refusal.value)) continue;
+    EXPECT_GT(refusal.value, 0.0) << share;
+    EXPECT_LT(refusal.value, refusal.wanted) << share;
+  }
+}
+
 TEST_F(InitialiserTest, RenewsItsReferenceAfterTheConfiguredFrames) {
   scene.config.initialisation.max_age_s = 0.6;
   initialiser.emplace(scene.config, scene.rig);

@@ -11,6 +11,7 @@
 
 #include "drivers/log/log_source.h"
 #include "ipc/image_encoder.h"
+#include "slam/geometry/image_mask.h"
 #include "tools/commands/commands.h"
 #include "tools/common/errors.h"
 #include "tools/common/progress.h"
@@ -19,9 +20,6 @@
 
 namespace farpoint::tools {
 namespace {
-
-// As daemon/config/mask_file.h has it: farpointd refuses more.
-constexpr double kMostMaskedShare = 0.9;
 
 struct MaskOptions {
   std::string log, output, overlay;
@@ -110,10 +108,10 @@ std::string overlay_name(const std::string& output) {
 int run_mask(const MaskOptions& options) {
   if (options.output == "-") throw InputError("mask: -o -, expected the name of a PNG file");
   const MaskProposal proposal = propose(options);
-  if (proposal.share() > kMostMaskedShare)
+  if (proposal.share() > slam::ImageMask::kMostShare)  // farpointd refuses more
     throw InputError(fmt::format(
         "{}: {:.1f} % of the image never moves, expected at most {:.0f} %: a recording with turns",
-        options.log, 100.0 * proposal.share(), 100.0 * kMostMaskedShare));
+        options.log, 100.0 * proposal.share(), 100.0 * slam::ImageMask::kMostShare));
   const std::string overlay = options.overlay.empty() ? overlay_name(options.output) : options.overlay;
   write_png(options.output, proposal, proposal.mask);
   write_png(overlay, proposal, overlay_of(proposal));

@@ -100,7 +100,7 @@ Probe probe_video(const fs::path& file) {
     rest.append(buffer.data(), got);
     std::size_t begin = 0;
     for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n', begin)) {
-      take_line(std::string_view(rest).substr(begin, end - begin), &probe);
+      take_line(std::string_view{rest}.substr(begin, end - begin), &probe);
       begin = end + 1;
     }
     rest.erase(0, begin);

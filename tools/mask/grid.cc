@@ -6,7 +6,7 @@
 namespace farpoint::tools {
 namespace {
 
-// `sum` along rows or columns by a running window.
+// Sums over `radius` cells to either side, along a row or a column; `step`: from one cell to the next.
 void sum_line(const double* from, double* to, std::size_t step, int length, int radius) {
   const auto at = [step](int i) { return static_cast<std::size_t>(i) * step; };
   for (int i = 0; i < length; ++i) {

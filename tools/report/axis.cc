@@ -25,6 +25,16 @@ std::vector<double> decade_ticks(double low, double high) {
   return values;
 }
 
+// Steps of equal size crowd at the upper end of a logarithmic axis: those too near to the one before are left
+// out, so that each label has its room.
+std::vector<double> apart(const std::vector<double>& values, double low, double high, int wanted) {
+  const double room = std::log(high / low) / (2.0 * wanted);
+  std::vector<double> kept;
+  for (const double v : values)
+    if (kept.empty() || std::log(v / kept.back()) >= room) kept.push_back(v);
+  return kept;
+}
+
 }  // namespace
 
 double Scale::share(double value) const {
@@ -62,7 +72,7 @@ std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
   if (is_log) {
     std::vector<double> values = decade_ticks(low, high);
     if (values.size() >= kFewest) return values;
-    wanted *= 2;  // they crowd at the upper end
+    wanted *= 2;  // some are left out below
   }
   std::vector<double> values;
   const double raw = (high - low) / wanted, power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -73,7 +83,7 @@ std::vector<double> ticks(double low, double high, int wanted, bool is_log) {
   double v = std::ceil(low / step - 1e-9) * step;
   for (int i = 0; i < kMostSteps && v <= high + 1e-9 * step; ++i, v += step)
     values.push_back(std::abs(v) < 1e-9 * step ? 0.0 : v);
-  return values;
+  return is_log ? apart(values, low, high, wanted / 2) : values;
 }
 
 std::string tick_text(double value, double step, bool is_log) {

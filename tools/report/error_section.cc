@@ -44,8 +44,7 @@ std::string error_view(const Runs& runs, const Truth& truth) {
               error_points(moved, runs[i].run.final_trajectory, runs[i].world_from_map()), run_style(i));
     const auto& live = runs[i].metrics->live_metrics;
     if (live && live->absolute) {
-      plot.line(runs[i].name + ", live",
-                error_points(moved, runs[i].run.log->live_trajectory, runs[i].world_from_live_map()),
+      plot.line(runs[i].name + ", live", error_points(moved, runs[i].live, runs[i].world_from_live_map()),
                 thin_run_style(i));
     }
   }

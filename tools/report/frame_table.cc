@@ -86,8 +86,7 @@ std::string time_cells(const timing_t* timing) {
 std::string frame_table(const RunRecord& run, const Truth* truth) {
   const ByTime<slam::SE3> final_poses =
       poses_by_time(moved_by(run.world_from_map(), run.run.final_trajectory));
-  const ByTime<slam::SE3> live_poses = poses_by_time(
-      run.run.log ? moved_by(run.world_from_live_map(), run.run.log->live_trajectory) : Trajectory{});
+  const ByTime<slam::SE3> live_poses = poses_by_time(moved_by(run.world_from_live_map(), run.live));
   const ByTime<slam::SE3> truth_poses = truth_by_time(run, truth);
   ByTime<PublishedVelocity> velocities;
   for (const PublishedVelocity& v : run.velocities) velocities[key_of(v.time_s)] = v;

@@ -34,8 +34,9 @@ Places places_of(const RunRecord& run) {
 
 std::vector<Eigen::Vector2d> way_of(const RunRecord& run) {
   std::vector<Eigen::Vector2d> way;
+  way.reserve(run.run.final_trajectory.poses.size());
   for (const TimedPose& p : run.run.final_trajectory.poses)
-    way.push_back((run.world_from_map() * p.pose.t).head<2>());
+    way.emplace_back((run.world_from_map() * p.pose.t).head<2>());
   return way;
 }
 
@@ -49,24 +50,34 @@ std::pair<Eigen::Vector2d, double> square_around(const std::vector<Eigen::Vector
   return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
 }
 
-// Around the way: metres, or in map units a share of half the way's extent.
+// Around the way: metres, or in map units a share of half the way's extent; never more than nearly all points
+// need, since few far ones would leave the picture empty.
 struct Margin {
   double metres, share;
 };
+constexpr double kNearlyAll_percent = 99.0;
+
+double reach_of(const Places& places, const Eigen::Vector2d& middle) {
+  std::vector<double> distances;
+  for (const auto* some : {&places.certain, &places.uncertain, &places.through_vmp})
+    for (const Eigen::Vector2d& p : *some) distances.push_back((p - middle).cwiseAbs().maxCoeff());
+  return distances.empty() ? 0.0 : percentile(distances, kNearlyAll_percent);
+}
 
 std::string picture(const RunRecord& run, const std::string& title, const Margin& margin) {
   const std::vector<Eigen::Vector2d> way = way_of(run);
   if (way.size() < 2) return {};
   const std::string unit = run.length_unit();
   const auto [middle, half_way] = square_around(way);
-  const double half = half_way + (unit == "m" ? margin.metres : margin.share * half_way);
+  const Places places = places_of(run);
+  const double room = unit == "m" ? margin.metres : margin.share * half_way;
+  const double half = std::min(half_way + room, std::max(1.1 * half_way, reach_of(places, middle)));
   Plot plot({run.name + ": " + title,
              {"x, " + unit, false, middle.x() - half, middle.x() + half},
              {"y, " + unit, false, middle.y() - half, middle.y() + half},
              true,
              520,
              520});
-  const Places places = places_of(run);
   plot.dots("sigma 30 % and more", places.uncertain, "#bbb", 1.6);
   plot.dots("points", places.certain, "#333", 1.8);
   plot.dots("points through VMPs", places.through_vmp, "#d8702a", 2.4);

@@ -62,8 +62,7 @@ std::vector<Quantity> attitudes(const Runs& runs, const Truth* truth) {
     };
     add(moved_by(runs[i].world_from_map(), runs[i].run.final_trajectory), ", final", run_style(i));
     if (runs[i].run.log)
-      add(moved_by(runs[i].world_from_live_map(), runs[i].run.log->live_trajectory), ", live",
-          thin_run_style(i));
+      add(moved_by(runs[i].world_from_live_map(), runs[i].live), ", live", thin_run_style(i));
   }
   const Eigen::Vector3d centre_deg = mean_angles_deg(quantities.front().values);
   for (Quantity& q : quantities) q.values = angles_around(centre_deg, std::move(q.values));

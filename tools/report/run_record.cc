@@ -7,6 +7,7 @@
 #include "ipc/channels.h"
 #include "ipc/log.h"
 #include "tools/common/errors.h"
+#include "tools/report/motion.h"
 
 namespace farpoint::tools::report {
 namespace {
@@ -73,6 +74,25 @@ void read_messages(const std::filesystem::path& file, RunRecord* record) {
   record->velocities = velocities.finish();
 }
 
+Trajectory of_fullest_map(const Trajectory& live) {
+  std::map<std::int32_t, std::size_t> poses;
+  for (const TimedPose& p : live.poses) ++poses[p.map_id];
+  const auto fullest = std::max_element(poses.begin(), poses.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+  return poses.size() < 2 ? live : of_map(fullest->first, live);
+}
+
+// The evaluation aligns the poses of all maps at once, as a receiver met them; a picture shows one map.
+slam::Sim3 alignment_of_live(const RunRecord& record, const Truth& truth) {
+  const RunMetrics& metrics = *record.metrics;
+  if (!metrics.live_metrics || !metrics.live_metrics->absolute) return {};
+  const slam::Sim3& of_all = metrics.live_metrics->absolute->map_to_world.S_world_map;
+  if (record.live.poses.size() == record.run.log->live_trajectory.poses.size()) return of_all;
+  const auto found =
+      align(pair_nearest(truth_for(record, truth), record.live), metrics.alignment, metrics.planar);
+  return found ? found->S_world_map : of_all;
+}
+
 }  // namespace
 
 const landmarks_t* RunRecord::landmarks() const {
@@ -86,11 +106,6 @@ const summary_t* RunRecord::summary() const {
 slam::Sim3 RunRecord::world_from_map() const {
   if (!metrics || !metrics->final_metrics.absolute) return {};
   return metrics->final_metrics.absolute->map_to_world.S_world_map;
-}
-
-slam::Sim3 RunRecord::world_from_live_map() const {
-  if (!metrics || !metrics->live_metrics || !metrics->live_metrics->absolute) return {};
-  return metrics->live_metrics->absolute->map_to_world.S_world_map;
 }
 
 bool RunRecord::is_threaded() const {
@@ -118,7 +133,9 @@ RunRecord read_run_record(const std::filesystem::path& file, const Truth* truth)
   record.name = record.run.name;
   RunMetrics metrics = evaluate_run(record.run, truth != nullptr ? *truth : Truth{}, {});
   record.own = metrics.own;
+  if (record.run.log) record.live = of_fullest_map(record.run.log->live_trajectory);
   if (truth != nullptr) record.metrics = std::move(metrics);
+  if (truth != nullptr) record.S_world_live = alignment_of_live(record, *truth);
   read_messages(file, &record);
   if (!record.frames.empty()) record.start_s = record.frames.front().time_s;
   return record;

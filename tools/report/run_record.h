@@ -37,10 +37,13 @@ struct RunRecord {
   OwnMetrics own;
   std::vector<PublishedFrame> frames;
   std::vector<PublishedVelocity> velocities;  // valid ones
+  // Valid poses as published, of the map that has most of them: poses of another map have another origin.
+  Trajectory live;
   std::vector<timing_t> timings;
   std::vector<status_t> statuses;
   std::optional<map_t> map;  // the last one published
   double start_s = 0.0;      // of the first frame published
+  slam::Sim3 S_world_live;   // see world_from_live_map()
 
   [[nodiscard]] const landmarks_t* landmarks() const;
   [[nodiscard]] const summary_t* summary() const;
@@ -48,7 +51,7 @@ struct RunRecord {
   [[nodiscard]] double scale() const;
   // Map coordinates to the world's, by the final and by the live trajectory; identity without truth.
   [[nodiscard]] slam::Sim3 world_from_map() const;
-  [[nodiscard]] slam::Sim3 world_from_live_map() const;
+  [[nodiscard]] const slam::Sim3& world_from_live_map() const { return S_world_live; }
   [[nodiscard]] bool is_threaded() const;  // in lockstep no frame has a latency
   [[nodiscard]] double end_s() const;      // of the last frame published; start_s without one
   [[nodiscard]] std::string length_unit() const;

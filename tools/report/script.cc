@@ -28,7 +28,11 @@ const ticks = (low, high, wanted, isLog) => {
   for (let decade = Math.pow(10, Math.floor(Math.log10(low))); high >= decade; decade *= 10)
     for (const m of high / low > 2e3 ? [1] : [1, 2, 5])
       if (m * decade >= 0.999 * low && 1.001 * high >= m * decade) out.push(m * decade);
-  return out.length >= 4 ? out : steps(low, high, 2 * wanted);
+  if (out.length >= 4) return out;
+  const room = Math.log(high / low) / (2 * wanted), apart = [];
+  for (const v of steps(low, high, 2 * wanted))
+    if (!apart.length || Math.log(v / apart[apart.length - 1]) >= room) apart.push(v);
+  return apart;
 };
 const axisOf = (words, from, to) => {
   const [a, b, kind] = words.split(" "), low = Number(a), high = Number(b), isLog = kind === "log";

@@ -241,8 +241,9 @@ std::string timing_section(const Runs& runs) {
   return section(
       "Timing",
       "CPU time of the thread that did the work. Tracking runs from the grey image to the pose handed to the "
-      "output; mapping works beside it in a threaded run, whose messages have no time of mapping or its "
-      "stages: 'mapping and rest' is the CPU time of the process without decoding, tracking and output.",
+      "output. In a threaded run mapping works beside it: its stages are of one keyframe as a rule, of those "
+      "that were done since the frame before; 'mapping and rest' is the CPU time of the process without "
+      "decoding, tracking and output.",
       row_of({histogram, tracking_over_time(runs), latency_histogram(runs), load_over_time(runs), bars}));
 }
 

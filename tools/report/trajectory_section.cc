@@ -17,9 +17,9 @@ Trajectory final_in_world(const RunRecord& run) {
 // Without truth only the poses of the final trajectory's map share a frame with it.
 Trajectory live_in_world(const RunRecord& run) {
   if (!run.run.log) return {};
-  const Trajectory& live = run.run.log->live_trajectory;
-  if (run.metrics || run.run.final_trajectory.poses.empty()) return moved_by(run.world_from_live_map(), live);
-  return of_map(run.run.final_trajectory.poses.front().map_id, live);
+  if (run.metrics || run.run.final_trajectory.poses.empty())
+    return moved_by(run.world_from_live_map(), run.live);
+  return of_map(run.run.final_trajectory.poses.front().map_id, run.run.log->live_trajectory);
 }
 
 void label_ends(const Trajectory& trajectory, bool with_end, Plot* plot) {

@@ -227,6 +227,19 @@ double Board::cpu_percent() const {
   return passed_s > 0.0 ? 100.0 * used_s / passed_s : NAN;
 }
 
+std::string Board::camera_line() const {
+  const status_t& s = *status_;
+  if (s.camera.empty()) return "";
+  std::string text = "camera    " + s.camera;
+  if (!s.camera_format.empty()) text += "   " + s.camera_format;
+  if (s.camera_rate_hz > 0.0) text += fmt::format(" at {:.4g} Hz", s.camera_rate_hz);
+  text += s.camera_exposure_us >= 0
+              ? fmt::format("   exposure {:.3g} ms", 1e-3 * static_cast<double>(s.camera_exposure_us))
+              : "   exposure unknown";
+  if (s.camera_gain >= 0.0) text += fmt::format("   gain {:.3g}", s.camera_gain);
+  return text + "\n";
+}
+
 std::string Board::count_lines() const {
   const status_t& s = *status_;
   std::string text;
@@ -234,10 +247,11 @@ std::string Board::count_lines() const {
       "queues    capture {} (most {})   mapping {} ({})   publish {} ({})   features a frame {}\n",
       s.capture_queue, s.capture_queue_max, s.mapping_queue, s.mapping_queue_max, s.publish_queue,
       s.publish_queue_max, s.features_asked);
-  text += fmt::format(
-      "camera    {} images   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
-      s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged, s.images_undecodable,
-      s.camera_losses);
+  text += camera_line();
+  text +=
+      fmt::format("images    {} in   {} dropped   {} missing   {} flagged   {} undecodable   lost {} times\n",
+                  s.frames_received, s.frames_dropped, s.images_missing, s.images_flagged,
+                  s.images_undecodable, s.camera_losses);
   if (s.stereo_pairs > 0 || s.stereo_left_alone > 0 || s.stereo_right_alone > 0) {
     text +=
         fmt::format("stereo    {} pairs   {} left alone   {} right alone   skew {:.1f} ms\n", s.stereo_pairs,

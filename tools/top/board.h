@@ -41,6 +41,7 @@ class Board {
   [[nodiscard]] std::string time_lines(double now_s) const;
   [[nodiscard]] double images_hz() const;
   [[nodiscard]] double cpu_percent() const;  // of one core; NaN with fewer than two messages
+  [[nodiscard]] std::string camera_line() const;
   [[nodiscard]] std::string count_lines() const;
   [[nodiscard]] std::string fault_lines() const;
   [[nodiscard]] std::string process_lines() const;

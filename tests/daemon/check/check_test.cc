@@ -30,6 +30,13 @@ std::set<std::string> files_in(const std::string& folder) {
   return names;
 }
 
+std::vector<std::string> subjects_of(const Outcome& outcome) {
+  std::vector<std::string> subjects;
+  std::istringstream lines(outcome.out);
+  for (std::string line; std::getline(lines, line);) subjects.push_back(line.substr(0, line.find("  ")));
+  return subjects;
+}
+
 class Check : public testing::Test {
  protected:
   Check() { test::write_synthetic_log(scratch_.path("film.lcm"), {}); }
@@ -51,14 +58,22 @@ TEST_F(Check, ALineForEachThingAndStatus0WhereNoneIsAnError) {
   const Outcome outcome = run_daemon(arguments({"--record", scratch_.path("run.lcm")}));
   EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
   EXPECT_EQ(outcome.err, "");
-  std::vector<std::string> subjects;
-  std::istringstream lines(outcome.out);
-  for (std::string line; std::getline(lines, line);) subjects.push_back(line.substr(0, line.find("  ")));
-  EXPECT_EQ(subjects,
-            (std::vector<std::string>{"configuration", "solver", "calibration", "camera", "LCM", "CAN",
-                                      "real-time priority", "cores", "locked memory", "clock of images",
-                                      "system clock", "recording", "state", "commands"}))
+  EXPECT_EQ(subjects_of(outcome),
+            (std::vector<std::string>{"configuration", "solver", "calibration", "mask", "camera", "LCM",
+                                      "CAN", "real-time priority", "cores", "locked memory",
+                                      "clock of images", "system clock", "recording", "state", "commands"}))
       << outcome.out;
+}
+
+TEST_F(Check, OfAReplayOnlyWhatThatReplayUsesIsLookedAt) {
+  const Outcome outcome =
+      run_daemon({"--check", "--replay", scratch_.path("film.lcm"), "--output", scratch_.path("out.lcm")});
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_EQ(subjects_of(outcome),
+            (std::vector<std::string>{"configuration", "solver", "calibration", "log", "mask", "--output"}))
+      << outcome.out;
+  EXPECT_FALSE(std::filesystem::exists(scratch_.path("out.lcm")));
+  EXPECT_EQ(run_daemon({"--check", "--replay", scratch_.path("none.lcm")}).status, 2);
 }
 
 TEST_F(Check, WritesNothingAndStartsNoThread) {

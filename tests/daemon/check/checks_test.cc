@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "ipc/image_encoder.h"
+#include "ipc/log.h"
 #include "tests/daemon/synthetic_log.h"
 #include "tests/ipc/scratch.h"
 #include "tests/support/paths.h"
@@ -114,6 +116,107 @@ TEST(CheckCamera, ASocketOfAnotherProcessIsLookedFor) {
   looked.findings = {};
   looked.look();
   expect_line(looked.findings, "camera", "error", "no socket");
+}
+
+// ---- masks
+
+// A PNG file of 480x320 px, the synthetic camera's size, whose upper rows are masked.
+void write_mask(const std::string& path, int masked_rows) {
+  std::vector<std::uint8_t> pixels(std::size_t{480} * 320, 255);
+  std::fill_n(pixels.begin(), 480 * masked_rows, std::uint8_t{0});
+  const std::vector<std::uint8_t> png = ipc::encode_png({480, 320, pixels});
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+}
+
+Findings masks_of(const CameraConfig& camera, const calibration_t& calibration) {
+  Config config;
+  config.camera = camera;
+  Findings findings;
+  check_masks(config, calibration, &findings);
+  return findings;
+}
+
+TEST(CheckMask, EachMaskIsReadAndItsShareIsNamed) {
+  const Scratch scratch;
+  write_mask(scratch.path("bonnet.png"), 80);
+  write_mask(scratch.path("other.png"), 32);
+  calibration_t calibration = test::synthetic_calibration();
+  CameraConfig camera;
+  expect_line(masks_of(camera, calibration), "mask", "ok", "none (camera.mask)");
+  EXPECT_EQ(line_of(masks_of(camera, calibration), "second mask"), "");
+  camera.mask = scratch.path("bonnet.png");
+  camera.second_mask = scratch.path("other.png");
+  expect_line(masks_of(camera, calibration), "mask", "ok", "bonnet.png: 25.0 % of the image");
+  expect_line(masks_of(camera, calibration), "second mask", "warning", "there is no camera 1");
+  calibration.cameras.push_back(calibration.cameras[0]);
+  expect_line(masks_of(camera, calibration), "second mask", "ok", "other.png: 10.0 % of the image");
+}
+
+TEST(CheckMask, AMaskThatTheStartRefusesIsAnError) {
+  const Scratch scratch;
+  CameraConfig camera;
+  camera.mask = scratch.path("none.png");
+  expect_line(masks_of(camera, test::synthetic_calibration()), "mask", "error", "camera.mask: ");
+  write_mask(scratch.path("all.png"), 320);
+  camera.mask = scratch.path("all.png");
+  expect_line(masks_of(camera, test::synthetic_calibration()), "mask", "error", "masks 100.0 % of the image");
+}
+
+// ---- the log of a replay
+
+struct CheckLog : testing::Test {
+  Findings look(const Config& config = {}) {
+    Findings findings;
+    calibration = check_log(log, config, &findings);
+    return findings;
+  }
+
+  const Scratch scratch;
+  const std::string log = scratch.path("run.lcm");
+  std::optional<calibration_t> calibration;
+};
+
+TEST_F(CheckLog, ItsImagesAndCalibrationAreDescribed) {
+  test::write_synthetic_log(log, {});
+  const Findings findings = look();
+  EXPECT_TRUE(calibration);
+  expect_line(findings, "calibration", "ok", "480 x 320, pinhole-radtan");
+  expect_line(findings, "log", "ok", "60 images in 5.9 s (10 Hz)");
+}
+
+TEST_F(CheckLog, ALogThatNoReplayTakesIsAnError) {
+  expect_line(look(), "calibration", "error", "run.lcm");
+  test::write_synthetic_log(log, {.with_calibration = false});
+  expect_line(look(), "calibration", "error", "CALIBRATION");
+  test::write_synthetic_log(log, {});
+  Config config;
+  config.camera.index = 1;
+  expect_line(look(config), "calibration", "error", "camera");
+  config = {};
+  config.image_mb = 1;
+  expect_line(look(config), "calibration", "error", "capacity.image_mb");
+  EXPECT_FALSE(calibration);
+  {
+    ipc::LogWriter writer(log);
+    writer.write_message("CALIBRATION", 0, test::synthetic_calibration());
+    writer.close();
+  }
+  expect_line(look(), "log", "error", "no image on CAMERA_0");
+}
+
+TEST_F(CheckLog, WhatAReplayLeavesOutIsAWarning) {
+  test::write_synthetic_log(log, {});
+  std::filesystem::resize_file(log, std::filesystem::file_size(log) - 100);
+  expect_line(look(), "log", "warning", "cut off within its last event");
+  {
+    ipc::LogWriter writer(log);
+    writer.write_message("CALIBRATION", 0, test::synthetic_calibration());
+    for (const int number : {0, 1, 1, 2})
+      writer.write_message("CAMERA_0", number, test::synthetic_image({}, number));
+    writer.close();
+  }
+  expect_line(look(), "log", "warning", "3 images in 0.2 s (10 Hz); 1 messages are not used");
 }
 
 // ---- bus and network

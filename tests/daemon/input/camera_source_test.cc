@@ -78,6 +78,52 @@ class FollowingCamera final : public drivers::Camera {
   drivers::CameraCounts counts_;
 };
 
+// Says what it streams, then gives one image; calls no thread.
+class DescribedCamera final : public drivers::Camera {
+ public:
+  bool next(int, ipc::GreyImage*, drivers::CameraFrame* frame) override {
+    if (turn++ == 0) {
+      drivers::CameraEvent event;
+      event.kind = drivers::CameraEvent::Kind::kStreaming;
+      event.format = drivers::CameraFormat::kNv12;
+      event.rate_hz = 25.0;
+      listener_(event);
+      return false;
+    }
+    frame->exposure_us = 3000;
+    frame->gain = 2.0F;
+    return true;
+  }
+  [[nodiscard]] bool is_streaming() const override { return true; }
+  [[nodiscard]] const drivers::CameraCounts& counts() const override { return counts_; }
+  void on_event(std::function<void(const drivers::CameraEvent&)> listener) override {
+    listener_ = std::move(listener);
+  }
+  void set_exposure(const drivers::ExposureOptions&) override {}
+
+  int turn = 0;
+
+ private:
+  std::function<void(const drivers::CameraEvent&)> listener_;
+  drivers::CameraCounts counts_;
+};
+
+TEST(CameraSource, AnImageComesWithFormatRateAndExposureOfItsStream) {
+  CameraSource source(0, std::make_unique<DescribedCamera>());
+  const std::atomic<bool> stop{false};
+  CapturedImage image;
+  ASSERT_EQ(source.next(stop, &image), CaptureStatus::kNothing);
+  EXPECT_EQ(image.camera.format, drivers::CameraFormat::kNv12);
+  EXPECT_EQ(image.camera.exposure_us, -1);
+  ASSERT_EQ(source.next(stop, &image), CaptureStatus::kImage);
+  EXPECT_EQ(image.camera.format, drivers::CameraFormat::kNv12);
+  EXPECT_EQ(image.camera.rate_hz, 25.0);
+  EXPECT_EQ(image.camera.exposure_us, 3000);
+  EXPECT_EQ(image.camera.gain, 2.0F);
+  drivers::CameraEvent event;
+  EXPECT_TRUE(source.take_event(&event)) << "the log has it too";
+}
+
 TEST(CameraSource, EveryImageOfAFurtherCameraIsReportedAndRecordedOnceWhileTheFirstOneRecordsToo) {
   const test::Scratch scratch;
   const std::string log = scratch.path("run.lcm");
@@ -125,6 +171,7 @@ TEST(CameraSource, EveryImageOfAFurtherCameraIsReportedAndRecordedOnceWhileTheFi
 
 TEST(CameraSource, ThreeCamerasAreCountedTogether) {
   std::vector<std::unique_ptr<FastCamera>> owned;
+  owned.reserve(3);
   for (int i = 0; i < 3; ++i) owned.push_back(std::make_unique<FastCamera>());
   CameraSource first(0, std::move(owned[0])), second(1, std::move(owned[1])), third(2, std::move(owned[2]));
   first.pair_with(&second, kPeriod_us / 4);

@@ -47,6 +47,23 @@ class FrameReporterTest : public ::testing::Test {
       config_, {"build", "config", "calibration"}, {&first_, &second_}, &publisher_, &maps_, 4321, true};
 };
 
+TEST_F(FrameReporterTest, TheStatusDescribesTheCameraOfALiveRun) {
+  report(package(0, 0, 0));
+  status_t s = kept_.of<status_t>(ipc::kStatusChannel).back();
+  EXPECT_EQ(s.camera + s.camera_format, "") << "a replay";
+  EXPECT_EQ(s.camera_exposure_us, -1);
+  reporter_.set_camera("usb:1-1");
+  FramePackage next = package(20, 0, 0);
+  next.camera = {drivers::CameraFormat::kYuyv, 29.97, 4500, 12.0F};
+  report(next);
+  s = kept_.of<status_t>(ipc::kStatusChannel).back();
+  EXPECT_EQ(s.camera, "usb:1-1");
+  EXPECT_EQ(s.camera_format, "YUYV");
+  EXPECT_EQ(s.camera_rate_hz, 29.97);
+  EXPECT_EQ(s.camera_exposure_us, 4500);
+  EXPECT_EQ(s.camera_gain, 12.0);
+}
+
 TEST_F(FrameReporterTest, HandsEachFrameOnceToEverySinkAndThePublisher) {
   for (int i = 0; i < 5; ++i) report(package(i, i, i));
   for (const test::KeptFrames* sink : {&first_, &second_}) {

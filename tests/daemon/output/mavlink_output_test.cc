@@ -2,18 +2,14 @@
 // The thread of the MAVLink output, and an autopilot that the test plays on a UDP port.
 #include "daemon/output/mavlink_output.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <functional>
 #include <vector>
 
 #include "daemon/system/stage_clock.h"
+#include "tests/support/udp_peer.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -29,45 +25,25 @@ std::int64_t steady_ns() {
 
 class Autopilot {
  public:
-  Autopilot() : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    EXPECT_EQ(::bind(fd_, reinterpret_cast<sockaddr*>(&address), size), 0);
-    EXPECT_EQ(::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    link = "udp:127.0.0.1:" + std::to_string(ntohs(address.sin_port));
-  }
-  ~Autopilot() { ::close(fd_); }
-  Autopilot(const Autopilot&) = delete;
-  Autopilot& operator=(const Autopilot&) = delete;
-
   // Takes what comes until `done`, and answers TIMESYNC requests where `answers` is set.
   void serve(const std::function<bool()>& done, bool answers) {
     const double end_s = steady_s() + kPatience_s;
-    while (!done() && steady_s() < end_s) {
-      pollfd descriptor{fd_, POLLIN, 0};
-      if (::poll(&descriptor, 1, 20) == 1) take(answers);
-    }
+    while (!done() && steady_s() < end_s) take(answers);
   }
-  void send(const mav::Frame& frame) const {
-    (void)::sendto(fd_, frame.bytes().data(), frame.bytes().size(), 0,
-                   reinterpret_cast<const sockaddr*>(&from_), sizeof(from_));
-  }
+  void send(const mav::Frame& frame) const { (void)peer_.answer(frame.bytes()); }
 
-  std::string link;
+  [[nodiscard]] const std::string& link() const { return peer_.address(); }
+
   std::vector<std::vector<std::uint8_t>> odometry;  // payloads
   std::vector<mav::Timesync> answers;               // to the autopilot's own requests
   int heartbeats = 0, requests = 0;
 
  private:
   void take(bool answers_requests) {
-    std::array<std::uint8_t, 600> room{};
-    socklen_t size = sizeof(from_);
-    const ssize_t count =
-        ::recvfrom(fd_, room.data(), room.size(), 0, reinterpret_cast<sockaddr*>(&from_), &size);
+    const std::vector<std::uint8_t> bytes = peer_.receive(20);
+    if (bytes.empty()) return;
     mav::Parser parser;
-    (void)parser.take({room.data(), static_cast<std::size_t>(count)});
+    (void)parser.take(bytes);
     const auto received = parser.next();
     ASSERT_TRUE(received);
     if (received->id == mav::kHeartbeat.id) ++heartbeats;
@@ -81,8 +57,7 @@ class Autopilot {
       send(mav::encode(mav::Timesync{steady_ns() + kAhead_ns, message.ts1_ns, 0, 0}, {1, 1}, 0));
   }
 
-  int fd_;
-  sockaddr_in from_{};
+  test::UdpPeer peer_;
 };
 
 template <typename T>
@@ -97,7 +72,7 @@ class MavlinkOutputTest : public testing::Test {
   void open(double rate_hz = 50) {
     MavlinkConfig config;
     config.enabled = true;
-    config.link = autopilot.link;
+    config.link = autopilot.link();
     config.rate_hz = rate_hz;
     output = std::make_unique<MavlinkOutput>(config);
     output->start(RealtimeConfig{}, nullptr);

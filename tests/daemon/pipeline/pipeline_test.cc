@@ -81,6 +81,19 @@ TEST_F(PipelineTest, MappingWorksOnTheJobsOfTheFrames) {
   EXPECT_GE(kept_.of<schedule_t>(ipc::kScheduleChannel).back().replies_taken, 3);
 }
 
+TEST_F(PipelineTest, TheTimesOfMappingsStagesArePublishedWithTheFrames) {
+  HandMadeSource source(25, std::chrono::milliseconds(60));
+  run(&source);
+  int mapped = 0;
+  for (const timing_t& t : kept_.of<timing_t>(ipc::kTimingChannel)) {
+    EXPECT_LT(t.cpu_ms[timing_t::STAGE_EXTRACTION], 0.0) << "of tracking only the whole is measured";
+    if (t.cpu_ms[timing_t::STAGE_LOCAL_BA] < 0.0) continue;
+    ++mapped;
+    EXPECT_GT(t.cpu_ms[timing_t::STAGE_MAPPING], t.cpu_ms[timing_t::STAGE_LOCAL_BA]);
+  }
+  EXPECT_GE(mapped, 1);
+}
+
 TEST_F(PipelineTest, WhatReadingThrowsIsThrownByRunAfterTheFramesBefore) {
   HandMadeSource source(4, std::chrono::milliseconds(20));
   source.throw_at_end();

@@ -2,60 +2,24 @@
 // A UDP socket of the loopback interface and a pseudo terminal stand in for the autopilot.
 #include "drivers/mavlink/mavlink_link.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <poll.h>
-#include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <array>
 #include <cstdlib>
+#include <string>
 #include <vector>
+
+#include "tests/support/udp_peer.h"
 
 namespace farpoint::drivers {
 namespace {
 
+constexpr int kPatience_ms = 2000;
 const std::vector<std::uint8_t> kMessage{1, 2, 3, 250, 17, 19};
-
-// A bound UDP socket on loopback.
-class Peer {
- public:
-  Peer() : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    EXPECT_EQ(::bind(fd_, reinterpret_cast<sockaddr*>(&address), size), 0);
-    EXPECT_EQ(::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    port = ntohs(address.sin_port);
-  }
-  ~Peer() { ::close(fd_); }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  // One datagram; answers it where there is an answer.
-  std::vector<std::uint8_t> receive(const std::vector<std::uint8_t>& answer = {}) const {
-    std::vector<std::uint8_t> bytes(500);
-    sockaddr_in from{};
-    socklen_t size = sizeof(from);
-    pollfd descriptor{fd_, POLLIN, 0};
-    if (::poll(&descriptor, 1, 2000) != 1) return {};
-    const ssize_t count =
-        ::recvfrom(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
-    bytes.resize(static_cast<std::size_t>(count));
-    if (!answer.empty()) {
-      EXPECT_GT(::sendto(fd_, answer.data(), answer.size(), 0, reinterpret_cast<sockaddr*>(&from), size), 0);
-    }
-    return bytes;
-  }
-  int port = 0;
-
- private:
-  int fd_;
-};
 
 std::vector<std::uint8_t> wait_and_receive(MavlinkLink* link) {
   pollfd descriptor{link->fd(), POLLIN, 0};
@@ -80,26 +44,23 @@ TEST(MavlinkAddress, WhatIsNoAddressIsRefused) {
 }
 
 TEST(MavlinkLink, UdpGoesBothWays) {
-  const Peer peer;
-  MavlinkLink link(MavlinkAddress::parse("udp:127.0.0.1:" + std::to_string(peer.port)));
+  test::UdpPeer peer;
+  MavlinkLink link(MavlinkAddress::parse(peer.address()));
   EXPECT_FALSE(link.send(kMessage));  // not open
   ASSERT_EQ(link.open(), "");
   std::array<std::uint8_t, 10> room{};
   EXPECT_TRUE(link.receive(room).empty());  // at once
   EXPECT_TRUE(link.send(kMessage));
-  EXPECT_EQ(peer.receive({9, 8, 7}), kMessage);
+  EXPECT_EQ(peer.receive(kPatience_ms), kMessage);
+  EXPECT_TRUE(peer.answer(std::vector<std::uint8_t>{9, 8, 7}));
   EXPECT_EQ(wait_and_receive(&link), (std::vector<std::uint8_t>{9, 8, 7}));
   EXPECT_EQ(link.counts().sent, 1U);
   EXPECT_EQ(link.counts().not_sent, 1U);
 }
 
 TEST(MavlinkLink, AUdpPortWithoutListenerIsCountedAndServedOnceThereIsOne) {
-  int port = 0;
-  {
-    const Peer gone;
-    port = gone.port;
-  }
-  MavlinkLink link(MavlinkAddress::parse("udp:127.0.0.1:" + std::to_string(port)));
+  const std::string address = test::UdpPeer().address();  // gone
+  MavlinkLink link(MavlinkAddress::parse(address));
   ASSERT_EQ(link.open(), "");
   for (int i = 0; i < 20; ++i) {
     (void)link.send(kMessage);

@@ -113,6 +113,53 @@ def message(number, nanoseconds, data):
     return record({"op": b"\x02", "conn": struct.pack("<I", number), "time": stamp(nanoseconds)}, data)
 
 
+def fields_of(piece):
+    """Fields of a record's header."""
+    size, at, fields = struct.unpack_from("<I", piece)[0], 4, {}
+    while at < 4 + size:
+        length = struct.unpack_from("<I", piece, at)[0]
+        name, _, value = piece[at + 4:at + 4 + length].partition(b"=")
+        fields[name], at = value, at + 4 + length
+    return fields
+
+
+def indexed_chunk(options, position, pieces):
+    """A chunk of these records with its index behind it, and the record of it for the bag's end. position: in the bag."""
+    entries, offset = {}, 0
+    for piece in pieces:
+        fields = fields_of(piece)
+        if fields[b"op"] == b"\x02":
+            entries.setdefault(fields[b"conn"], []).append((fields[b"time"], struct.pack("<I", offset)))
+        offset += len(piece)
+    times = sorted((struct.unpack("<II", time), time) for list_ in entries.values() for time, _ in list_) or [((0, 0), stamp(0))]
+    body = chunk_record(options, b"".join(pieces))
+    for conn, list_ in entries.items():
+        body += record({"op": b"\x04", "ver": struct.pack("<I", 1), "conn": conn, "count": struct.pack("<I", len(list_))},
+                       b"".join(time + offset for time, offset in list_))
+    info = record({"op": b"\x06", "ver": struct.pack("<I", 1), "chunk_pos": struct.pack("<Q", position),
+                   "start_time": times[0][1], "end_time": times[-1][1], "count": struct.pack("<I", len(entries))},
+                  b"".join(conn + struct.pack("<I", len(list_)) for conn, list_ in entries.items()))
+    return body, info
+
+
+def bag_of(options, connections, messages):
+    """All of a bag: connections and messages as records, in one chunk or one a message."""
+    def head(index_pos, chunks):
+        """4096 bytes, as ROS pads it."""
+        fields = {"op": b"\x03", "index_pos": struct.pack("<Q", index_pos), "conn_count": struct.pack("<I", len(connections)),
+                  "chunk_count": struct.pack("<I", chunks)}
+        return b"#ROSBAG V2.0\n" + record(fields, b" " * (4096 - len(record(fields, b""))))
+
+    chunks = [connections, *([m] for m in messages)] if options.split else [connections + messages]
+    if options.unindexed:
+        return head(0, len(chunks)) + b"".join(chunk_record(options, b"".join(pieces)) for pieces in chunks)
+    body, infos = b"", b""
+    for pieces in chunks:
+        chunk, info = indexed_chunk(options, len(head(0, 0)) + len(body), pieces)
+        body, infos = body + chunk, infos + info
+    return head(len(head(0, 0)) + len(body), len(chunks)) + body + b"".join(connections) + infos
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out")
@@ -147,7 +194,7 @@ def main():
     if options.two_types:
         topics.append((options.image_name, options.two_types))
     number = {topic: i for i, (topic, _) in reversed(list(enumerate(topics)))}
-    connections = b"".join(connection(i, topic, kind) for i, (topic, kind) in enumerate(topics))
+    connections = [connection(i, topic, kind) for i, (topic, kind) in enumerate(topics)]
 
     messages = []
     if not options.no_info:
@@ -180,20 +227,8 @@ def main():
             for name, pack in (("/pose", pose), ("/transform", transform), ("/point", point), ("/twist", twist)):
                 messages.append(message(number[name], when, pack(i, when)))
 
-    if options.split:
-        body = chunk_record(options, connections) + b"".join(chunk_record(options, m) for m in messages)
-    else:
-        body = chunk_record(options, connections + b"".join(messages))
-    if not options.unindexed:
-        body += record({"op": b"\x04", "ver": struct.pack("<I", 1), "conn": struct.pack("<I", 1),
-                        "count": struct.pack("<I", 1)}, stamp(0) + struct.pack("<I", 0))
-    bag_header = record({"op": b"\x03", "index_pos": struct.pack("<Q", 0), "conn_count": struct.pack("<I", 4),
-                         "chunk_count": struct.pack("<I", 1)}, b" " * 100)
-    end = b"" if options.unindexed else connections + record(
-        {"op": b"\x06", "ver": struct.pack("<I", 1), "chunk_pos": struct.pack("<Q", 0), "start_time": stamp(0),
-         "end_time": stamp(0), "count": struct.pack("<I", 0)}, b"")
     with open(options.out, "wb") as file:
-        file.write(b"#ROSBAG V2.0\n" + bag_header + body + end)
+        file.write(bag_of(options, connections, messages))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,25 @@ def packed(data):
                           check=True).stdout
 
 
+def new_bag(path, topics):
+    """An open database of rosbag2's tables with the topics (name, type, encoding), numbered from 1."""
+    if os.path.exists(path):
+        os.remove(path)
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+                     "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
+    database.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
+                     "data BLOB NOT NULL)")
+    database.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
+    for number, (name, kind, encoding) in enumerate(topics, 1):
+        database.execute("INSERT INTO topics VALUES (?, ?, ?, ?, '')", (number, name, kind, encoding))
+    return database
+
+
+def put(database, topic, nanoseconds, data):
+    database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", (topic, nanoseconds, data))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out")
@@ -31,37 +50,26 @@ def main():
     parser.add_argument("--packed", action="store_true")
     options = parser.parse_args()
 
-    if os.path.exists(options.out):
-        os.remove(options.out)
-    database = sqlite3.connect(options.out)
-    database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
-                     "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
-    database.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
-                     "data BLOB NOT NULL)")
-    database.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
     topics = [("/cam0/image_raw", "sensor_msgs/msg/Image", "cdr"), ("/imu", "sensor_msgs/msg/Imu", "cdr"),
               ("/odom", "nav_msgs/msg/Odometry", "cdr"), ("/cam0/camera_info", "sensor_msgs/msg/CameraInfo", "cdr"),
               ("/notes", "sensor_msgs/msg/Image", "json")]
-    for number, (name, kind, encoding) in enumerate(topics, 1):
-        database.execute("INSERT INTO topics VALUES (?, ?, ?, ?, '')", (number, name, kind, encoding))
+    database = new_bag(options.out, topics)
 
-    def put(topic, nanoseconds, data):
-        if options.packed:
-            data = packed(data)
-        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)",
-                         (topic, SECONDS * 10**9 + nanoseconds, data))
+    def add(topic, nanoseconds, data):
+        put(database, topic, SECONDS * 10**9 + nanoseconds, packed(data) if options.packed else data)
 
-    put(4, 0, camera_info())
-    put(5, 0, b"{}")
+    add(4, 0, camera_info())
+    add(5, 0, b"{}")
     for i in range(10):
-        put(2, 10_000_000 * i + 5, imu(i, 10_000_000 * i))
+        add(2, 10_000_000 * i + 5, imu(i, 10_000_000 * i))
     for i in range(4):
-        put(3, 30_000_000 * i + 5, odometry(i, 30_000_000 * i))
+        add(3, 30_000_000 * i + 5, odometry(i, 30_000_000 * i))
     for i in range(options.first, options.to):
-        put(1, 50_000_000 * i + 1_000_000, image(i, 50_000_000 * i))
+        add(1, 50_000_000 * i + 1_000_000, image(i, 50_000_000 * i))
     database.executescript(options.sql)
     database.commit()
     database.close()
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -37,6 +37,15 @@ TEST(Axis, ShortLogarithmicAxisHasTicksToReadBy) {
   EXPECT_EQ(tick_text(20, 10, false), "20");
 }
 
+TEST(Axis, LabelsOfALogarithmicAxisHaveRoom) {
+  for (const auto& [low, high] : {std::pair(6.5, 80.0), {0.7, 1.5}, {15.0, 60.0}, {0.9, 8.0}}) {
+    const std::vector<double> values = ticks(low, high, 7, true);
+    EXPECT_GE(values.size(), 4U) << low << " " << high;
+    for (std::size_t i = 1; i < values.size(); ++i)
+      EXPECT_GT(std::log(values[i] / values[i - 1]) / std::log(high / low), 0.065) << values[i];
+  }
+}
+
 TEST(Axis, TicksOfOneAxisHaveDifferentTexts) {
   for (const auto& [low, high] :
        {std::pair(0.29, 1.5), {15.0, 60.0}, {1.1, 1.9}, {0.001, 0.004}, {3.0, 900.0}}) {

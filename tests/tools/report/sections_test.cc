@@ -63,6 +63,20 @@ TEST_F(Sections, PathsAreDrawnFinalLiveAndByTheirError) {
   EXPECT_FALSE(has(alone, "position error"));
 }
 
+TEST_F(Sections, TheLivePathIsThatOfTheMapWithMostPoses) {
+  MadeRun run;
+  run.final_trajectory = disturbed(truth.body, 0.5, 0.02, &random);
+  run.other_map_from = 300;
+  write_run_log(file("one"), run);
+  const RunRecord record = read_run_record(file("one"), &truth);
+  ASSERT_EQ(record.live.poses.size(), 290U);
+  for (const TimedPose& p : record.live.poses) EXPECT_EQ(p.map_id, 7);
+  const slam::Sim3& S = record.world_from_live_map();
+  EXPECT_NEAR(S.scale, 2.0, 0.05);
+  const TimedPose& last = record.live.poses.back();
+  EXPECT_LT((S * last.pose.t - truth.body.poses[299].pose.t).norm(), 0.5);
+}
+
 TEST_F(Sections, ErrorsAreShownOverTheWayAndByLength) {
   const std::string html = error_section(runs(&truth), &truth);
   for (const char* title : {"Position error over the way", "Scale over the way",

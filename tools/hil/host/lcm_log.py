@@ -13,9 +13,10 @@ IMAGE = struct.Struct(">qqiifiiiii")
 # camera_calibration_t behind its two strings.
 CAMERA = struct.Struct(">ii4d5d3d4ddd")
 
-# status_t behind its fingerprint, as far as it is read here.
-STATUS = struct.Struct(">qbbdbii24qb")
+# status_t behind its fingerprint, as far as it is read here: before and behind its two strings of the camera.
+STATUS_HEAD, STATUS_REST = struct.Struct(">qbbdbii"), struct.Struct(">did24qb")
 STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter",
+                "camera_rate_hz", "camera_exposure_us", "camera_gain",
                 "frames_received", "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped",
                 "deadlines_missed",
                 "images_wrong_size", "images_undecodable", "images_missing", "images_flagged", "camera_losses",
@@ -73,7 +74,10 @@ def images(path, wanted="CAMERA_0"):
 def last_status(path):
     """name -> value of the last FARPOINT_STATUS."""
     last = [data for channel, data in events(path) if channel == "FARPOINT_STATUS"][-1]
-    return dict(zip(STATUS_NAMES, STATUS.unpack_from(last, FINGERPRINT_BYTES)))
+    rest = FINGERPRINT_BYTES + STATUS_HEAD.size
+    for _ in range(2):
+        rest += 4 + int.from_bytes(last[rest:rest + 4], "big")
+    return dict(zip(STATUS_NAMES, STATUS_HEAD.unpack_from(last, FINGERPRINT_BYTES) + STATUS_REST.unpack_from(last, rest)))
 
 
 def wheels(path):
