@@ -115,7 +115,7 @@ void put_diagnosis(const OdometryEpoch& e, RawValues* out) {
       .code(CanSignal::kScaleSource, static_cast<std::uint64_t>(e.scale_source))
       .value(CanSignal::kScaleSigma, true, e.scale_sigma)
       .code(CanSignal::kImu, kNoSensor)
-      .code(CanSignal::kWheels, kNoSensor)
+      .code(CanSignal::kWheels, static_cast<std::uint64_t>(e.wheels))
       .code(CanSignal::kLayout, kCanLayoutNumber)
       .code(CanSignal::kSendTime, static_cast<std::uint64_t>(e.send_time_us) / kMsPeriod_us);
 }

@@ -21,7 +21,14 @@ inline constexpr std::uint8_t kCanStateLost = 5, kCanStateStopped = 8;
 enum class CanYesNo : std::uint8_t { kNo = 0, kYes = 1, kNotAvailable = 3 };
 
 // Raw values of ScaleSource that this version sends.
-enum class CanScaleSource : std::uint8_t { kNone = 0, kAssumed = 1, kNotAvailable = 15 };
+enum class CanScaleSource : std::uint8_t {
+  kNone = 0,
+  kAssumed = 1,
+  kSecondCamera = 2,
+  kWheels = 4,
+  kNotAvailable = 15
+};
+enum class CanSensorUse : std::uint8_t { kNone = 0, kStarting = 1, kUsed = 2, kContradicted = 3 };
 
 // What is sent at one time. Metres, radians, seconds. A value that is not finite is sent as 'not available'.
 struct OdometryEpoch {
@@ -53,6 +60,7 @@ struct OdometryEpoch {
   CanYesNo levelled = CanYesNo::kNotAvailable, body_is_camera = CanYesNo::kNotAvailable;
   CanScaleSource scale_source = CanScaleSource::kNotAvailable;
   double scale_sigma = -1.0;  // relative
+  CanSensorUse wheels = CanSensorUse::kNone;
 };
 
 // Heading (yaw, left positive), pitch (nose down positive) and roll of a body with REP-103 axes: R =

@@ -150,13 +150,13 @@ constexpr std::array<CanSignalInfo, kCanSignals> kSignals{{
     code(M::kDiagnosis, "ScaleSource", 36, 4, 14,
          "0 \"none\" 1 \"assumed\" 2 \"second camera\" 3 \"inertial\" 4 \"wheels\" 5 \"several\" "
          "6 \"loaded map\" 15 \"not available\"",
-         "Where metres come from. 2 to 6 are reserved for later versions.", 15),
+         "Where metres come from. 3, 5 and 6 are reserved for later versions.", 15),
     magnitude(M::kDiagnosis, "ScaleSigma", 40, 12, 0.001, 4.093, "",
               "4094 \"more than 4.093\" 4095 \"not available\"",
               "Standard deviation of the scale, relative. It comes on top of that of the position."),
     code(M::kDiagnosis, "Imu", 52, 3, 6, kSensor, "Inertial sensor. Reserved: none in this version.", 7),
     code(M::kDiagnosis, "Wheels", 55, 3, 6, kSensor,
-         "Wheel speeds in the pose. Reserved: none in this version.", 7),
+         "Wheel speeds in the pose. 1: there are samples, which the images have not judged yet.", 7),
     code(M::kDiagnosis, "Layout", 58, 6, 63, "", "Number of this layout: 2.", 2),
     code(M::kFdOnly, "SendTime", 16, 16, 65535, "",
          "Time of sending on the daemon's clock, ms modulo 65536. A frame that comes late by the receiver's "

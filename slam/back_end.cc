@@ -5,11 +5,17 @@
 
 namespace farpoint::slam {
 
-BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
+BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
+                 const VehiclePoints& points)
     : config_(config),
+      points_(points),
       rings_(*rings),
+      wheels_(config.wheels, points.wheels_m,
+              rig.cameras.size() > 1 ? MetreSource::kCameras : MetreSource::kWheels),
       mapper_(config, rig),
-      poser_(config, static_cast<int>(rig.cameras.size())) {}
+      poser_(config, static_cast<int>(rig.cameras.size())) {
+  if (config.wheels.use) mapper_.use_motion(&wheels_);
+}
 
 void BackEnd::collect_recorded() {
   while (const RecordedFrame* frame = rings_.recorded.front()) {
@@ -31,6 +37,7 @@ bool BackEnd::step() {
   reply_->utime = job->utime;
   reply_->stage = MappingStage::kDone;
   reply_->ends_job = true;
+  if (!inserted_) wheels_.add(job->wheels);
   switch (job->kind) {
     case MappingJobKind::kStartMap:
       reply_->stage = MappingStage::kStarted;

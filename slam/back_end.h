@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "slam/fusion/wheel_fusion.h"
+#include "slam/fusion/wheel_motion_model.h"
 #include "slam/map/growing_memory.h"
 #include "slam/mapping/mapper.h"
 #include "slam/mapping_rings.h"
@@ -16,7 +18,8 @@ namespace farpoint::slam {
 
 class BackEnd {
  public:
-  BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings);
+  BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
+          const VehiclePoints& points = {});
 
   void listen(StageListener* listener) {
     listener_ = listener;
@@ -35,6 +38,8 @@ class BackEnd {
   void transform_map(std::int32_t map_id, const Sim3& S_new_old) { mapper_.transform_map(map_id, S_new_old); }
 
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
+  // From the map's body to the calibration's.
+  [[nodiscard]] const Eigen::Vector3d& body_point_m() const { return points_.body_m; }
   // Empty without capacity.whole_trajectory.
   [[nodiscard]] const std::pmr::deque<KeptFrame>& recorded() const { return recorded_; }
   // Work space of the tracker that poses frames from before the map.
@@ -48,7 +53,9 @@ class BackEnd {
   void discard_map(std::int32_t map_id);
 
   const EstimatorConfig config_;
+  const VehiclePoints points_;
   MappingRings& rings_;
+  WheelFusion wheels_;
   Mapper mapper_;
   Tracker poser_;
   GrowingMemory recorded_memory_;

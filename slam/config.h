@@ -94,6 +94,21 @@ struct OdometryConfig {
   double correction_rad_per_s = 0.0175;  // turn, while the vehicle moves: one degree a second
 };
 
+// Wheel speeds: motion of one point of the body along the body's x axis, and the body's yaw rate.
+struct WheelConfig {
+  bool use = true;
+  double x_m = 0, y_m = 0, z_m = 0;    // where on the body the speed is measured, body axes
+  double delay_ms = 0;                 // by which the samples' times are late
+  double factor = 1;                   // metres driven in one that the wheels tell
+  double scale_sigma = 0.02;           // of the factor, relative
+  double speed_sigma_mps = 0.05;       // of the speed between two keyframes; of samples without their own
+  double yaw_rate_sigma_radps = 0.01;  // the same of the yaw rate
+  double slip_sigma = 0.01;            // share of the way between two keyframes
+  double gate_sigmas = 3.5;  // contradiction of the images beyond which an interval is left out; 0: none
+  double max_gap_s = 0.25;   // between two samples; motion across a longer gap is unknown
+  double blind_s = 5;        // longest time that odometry goes on by wheels alone
+};
+
 struct EstimatorConfig {
   PyramidOptions pyramid;
   ExtractorOptions extractor;
@@ -105,6 +120,7 @@ struct EstimatorConfig {
   MappingConfig mapping;
   CalibrationConfig calibration;
   OdometryConfig odometry;
+  WheelConfig wheels;
 };
 
 }  // namespace farpoint::slam

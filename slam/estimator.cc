@@ -30,14 +30,22 @@ Rig usable_rig(const Rig& rig) {
   return rig.cameras.size() > 1 ? rig : with_body_at_camera(rig, 0);
 }
 
+// From the body of usable_rig().
+VehiclePoints vehicle_points(const WheelConfig& wheels, const Rig& given, const Rig& usable) {
+  VehiclePoints points;
+  points.body_m = usable.cameras.front().T_body_camera.t - given.cameras.front().T_body_camera.t;
+  points.wheels_m = points.body_m + Eigen::Vector3d(wheels.x_m, wheels.y_m, wheels.z_m);
+  return points;
+}
+
 }  // namespace
 
 struct Estimator::Impl {
   Impl(const EstimatorConfig& config, const Rig& given)
       : rig(usable_rig(given)),
         rings(config),
-        front_end(config, rig, &rings),
-        back_end(config, rig, &rings) {}
+        front_end(config, rig, &rings, vehicle_points(config.wheels, given, rig)),
+        back_end(config, rig, &rings, vehicle_points(config.wheels, given, rig)) {}
 
   bool map() {
     if (!back_end.step()) return false;

@@ -8,7 +8,7 @@
 
 #include "slam/geometry/se3.h"
 #include "slam/image/extractor.h"
-#include "slam/map/refusal.h"
+#include "slam/map/map_judgement.h"
 #include "slam/mapping/counts.h"
 #include "slam/odometry_errors.h"
 
@@ -31,6 +31,9 @@ enum class State : std::uint8_t {
 }
 
 enum class ScaleState : std::uint8_t { kUnknown = 0, kAssumed = 1, kMetric = 2 };
+
+// What a metric scale comes from.
+enum class MetreSource : std::uint8_t { kNone, kSecondCamera, kWheels };
 
 // An image of one camera of the rig.
 struct CameraImage {
@@ -72,7 +75,8 @@ struct FrameResult {
   std::int64_t utime = 0;
   std::int64_t sequence = 0;
   State state = State::kStarting;
-  bool has_pose = false;  // T_map_body is an estimate (not necessarily valid, see state)
+  bool has_pose = false;    // T_map_body is an estimate (not necessarily valid, see state)
+  bool from_vision = true;  // false: carried on by wheels alone
   SE3 T_map_body;
   SE3 T_odom_body;  // continuous: integrates relative motion, never jumps
   Sim3 map_from_odom;
@@ -85,6 +89,8 @@ struct FrameResult {
   int quality = -1;                                     // -1 unknown, 0..100
   std::uint32_t reset_counter = 0;
   ScaleState scale = ScaleState::kUnknown;
+  MetreSource metre = MetreSource::kNone;
+  WheelTrust wheels = WheelTrust::kNone;  // what the images say of the wheels
   std::int32_t map_id = 0;
   std::uint64_t view_sequence = 0;  // of the local map that this frame was tracked against; 0: none
   int features = 0, matches = 0, inliers = 0, aligned = 0;

@@ -12,7 +12,7 @@ namespace {
 // Room for samples that wait for a frame: two seconds of a 1 kHz IMU, and of wheels at 100 Hz. Kept for
 // fusion: twice that.
 constexpr std::size_t kImuWaiting = 2048, kImuKept = 4096;
-constexpr std::size_t kWheelsWaiting = 256, kWheelsKept = 512;
+constexpr std::size_t kWheelsWaiting = 256;
 
 std::int64_t seconds_to_us(double s) {
   return static_cast<std::int64_t>(std::llround(1e6 * s));
@@ -32,8 +32,10 @@ int quality_of(const TrackOutcome& outcome) {
 
 }  // namespace
 
-FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings)
+FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
+                   const VehiclePoints& points)
     : config_(config),
+      points_(points),
       intake_(config, rig, static_cast<int>(rig.cameras.size())),
       initialiser_(config, rig),
       tracker_(config, static_cast<int>(rig.cameras.size())),
@@ -42,7 +44,10 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       uncertainty_(rig),
       repeated_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
-      wheels_(kWheelsWaiting, kWheelsKept) {
+      wheels_(kWheelsWaiting, kWheelsKept),
+      wheel_motion_(config.wheels, points.wheels_m),
+      carried_(config.wheels) {
+  tracker_.use_motion_model(&wheel_prior_);
   waiting_.reserve(2 * Initialiser::kHistoryFrames);
 }
 
@@ -80,6 +85,7 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   result_.utime = frame->utime;
   result_.sequence = frame->sequence;
   result_.features = static_cast<int>(frame->feature_count());
+  by_wheels_ = false;
   take_samples(*frame, limit.up_to);
   take_replies(frame->utime, {limit.replies_by_delay, limit.up_to.replies});
   repeated_share_ = repeated_.add(frame->views[0].set);
@@ -92,25 +98,39 @@ const FrameResult& FrontEnd::step(const std::shared_ptr<Frame>& frame, const Tak
   } else if (held) {
     hold_pose(*frame);
   } else if (blind) {
-    skip_blind_frame();
+    skip_blind_frame(*frame);
   } else {
     follow(frame);
   }
   if (!blind || held) recovery_.note_seen(frame->utime);
   fill_map_state();
   if (blind && !held && state_ != State::kInitialising) result_.state = State::kLost;
-  result_.refusal = refusal_of(*frame, blind && !held);
+  if (by_wheels_)
+    result_.state = State::kDegraded;
+  else
+    result_.refusal = refusal_of(*frame, blind && !held);
   result_.jobs_under_way = static_cast<int>(port_.jobs_under_way());
+  place_body();
   return result_;
 }
 
 void FrontEnd::take_samples(const Frame& frame, const FrameTaken& up_to) {
   imu_.take_until(frame.utime, up_to.imu);
   wheels_.take_until(frame.utime, up_to.wheels);
+  read_wheels();
   counts_.imu = imu_.counts();
   counts_.wheels = wheels_.counts();
   result_.taken.imu = counts_.imu.taken();
   result_.taken.wheels = counts_.wheels.taken();
+}
+
+void FrontEnd::read_wheels() {
+  if (!config_.wheels.use) return;
+  const SampleHistory<WheelSample>& history = wheels_.history();
+  std::size_t first = history.size();
+  while (first > 0 && history[first - 1].utime > wheels_read_utime_) --first;
+  for (std::size_t i = first; i < history.size(); ++i) wheel_motion_.add(history[i]);
+  if (history.size() > 0) wheels_read_utime_ = history[history.size() - 1].utime;
 }
 
 Refusal FrontEnd::refusal_of(const Frame& frame, bool blind) const {
@@ -162,13 +182,20 @@ void FrontEnd::take_view(std::shared_ptr<const LocalView> view) {
   const SE3 before = tracker_.T_world_body();
   const bool first = tracker_.view() == nullptr;
   const double scale = tracker_.set_view(std::move(view));
-  note_whether_settled();
+  note_judgement();
   // The pose moved with its keyframe: the correction belongs to map_from_odom, not to odom.
   if (!first) odometry_.correct(before, tracker_.T_world_body(), scale);
+  // The metre was found: odom is in metres from here on.
+  if (!first && scale != 1.0 && tracker_.view()->judgement.metric) {
+    odometry_.begin_unit(tracker_.T_world_body());
+    uncertainty_.begin();
+  }
 }
 
-void FrontEnd::note_whether_settled() {
-  if (!tracker_.view()->judgement.steady) return;
+void FrontEnd::note_judgement() {
+  const MapJudgement& judgement = tracker_.view()->judgement;
+  wheel_motion_.trust(judgement.wheels, judgement.wheel_factor);
+  if (!judgement.steady) return;
   odometry_.follow_map();
   recovery_.note_settled();
 }
@@ -190,14 +217,16 @@ void FrontEnd::start_map(const MappingReply& reply) {
   ++map_id_;
   ++counts_.maps;
   odometry_.begin_map();
-  uncertainty_.begin_map();
+  uncertainty_.begin();
   recovery_.begin_map();
   validity_.begin_map();
+  valid_utime_.reset();
+  carried_.clear();
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
   keyframe_utime_ = second.utime - seconds_to_us(config_.keyframes.min_interval_s);
   tracker_.start(view.T_world_reference, second.utime);
   tracker_.set_view(reply.view);
-  note_whether_settled();
+  note_judgement();
   if (view.judgement.metric) no_depth_utime_.reset();
   last_before_map_ = second.number;
   waiting_.assign(initialiser_.history().begin(), initialiser_.history().end());
@@ -260,6 +289,7 @@ void FrontEnd::start_from(const InitialPair& pair) {
   if (job == nullptr) return;
   job->map_id = map_id_ + 1;
   job->pair = pair;
+  add_wheels(job);
   send_job();
   start_pair_ = {pair.first, pair.second};
 }
@@ -267,10 +297,72 @@ void FrontEnd::start_from(const InitialPair& pair) {
 // --- against the map
 
 // A frame that shows nothing counts as a missing one.
-void FrontEnd::skip_blind_frame() {
+void FrontEnd::skip_blind_frame(const Frame& frame) {
   standstill_.note_loss();
   result_.has_pose = false;
   result_.view_sequence = tracker_.view() != nullptr ? tracker_.view()->sequence : 0;
+  if (const std::optional<SE3> motion = unseen_motion(frame)) tracker_.carry(*motion, frame.utime);
+  carry_on(frame);
+}
+
+// Motion since odom's newest pose, by wheels; empty where they may not stand in for images.
+std::optional<SE3> FrontEnd::unseen_motion(const Frame& frame) const {
+  const LocalView* view = tracker_.view();
+  if (view == nullptr || !view->judgement.metric || !wheel_motion_.trusted() || !valid_utime_)
+    return std::nullopt;
+  if (seconds_between(*valid_utime_, frame.utime) > config_.wheels.blind_s) return std::nullopt;
+  return wheel_motion_.motion(posed_utime_, frame.utime);
+}
+
+// Odometry goes on by wheels alone: degraded and valid, for a limited time. The map keeps nothing of it.
+void FrontEnd::carry_on(const Frame& frame) {
+  if (state_ == State::kInitialising) return;
+  const std::optional<SE3> motion = unseen_motion(frame);
+  if (!motion) return;
+  odometry_.carry(*motion);
+  const double dt_s = seconds_between(posed_utime_, frame.utime);
+  const Vector6d before = carried_.variances();
+  carried_.add(*motion, dt_s);
+  by_wheels_ = true;
+  posed_utime_ = frame.utime;
+  const Vector6d growth = carried_.variances() - before;
+  uncertainty_.carry(odometry_.T_odom_body(), frame.utime, growth.asDiagonal());
+  fill_carried(*motion, dt_s);
+}
+
+void FrontEnd::fill_carried(const SE3& T_from_to, double dt_s) {
+  result_.has_pose = true;
+  result_.from_vision = false;
+  note_metre();
+  result_.quality = 0;
+  result_.T_map_body = odometry_.T_map_body();
+  result_.T_odom_body = odometry_.T_odom_body();
+  result_.map_from_odom = odometry_.map_from_odom(result_.T_map_body);
+  result_.velocity_body = SE3{}.boxminus_to(T_from_to) / dt_s;
+  result_.odometry = uncertainty_.errors();
+  result_.covariance = tracker_.pose_errors().noise;
+  result_.covariance.diagonal() += carried_.variances();
+  result_.velocity_covariance = carried_.variances_of(result_.velocity_body).asDiagonal();
+}
+
+// After frames by wheels alone: the last stretch is theirs too, so that odom makes no step.
+void FrontEnd::rejoin_map(const Frame& frame, const SE3& T_map_body) {
+  if (carried_.empty()) return;
+  if (const std::optional<SE3> motion = wheel_motion_.motion(posed_utime_, frame.utime)) {
+    odometry_.carry(*motion);
+    odometry_.rejoin(T_map_body);
+  }
+  carried_.clear();
+}
+
+// Wheels and images agree that nothing moves. Images may show what a locked wheel does not: a pose further
+// from the one held than noise is none.
+bool FrontEnd::stands_still(const Frame& frame, const TrackOutcome& outcome) const {
+  // Of a landmark at the median depth, as seen from the vehicle: two pixels of a common lens.
+  constexpr double kNoise_rad = 0.003;
+  if (!standstill_.stands() || !wheel_motion_.stands(frame.utime)) return false;
+  const Vector6d moved = tracker_.T_world_body().boxminus_to(outcome.T_world_body);
+  return moved.head<3>().norm() / tracker_.view()->median_depth + moved.tail<3>().norm() < kNoise_rad;
 }
 
 // The image is the one before, and the vehicle stands: so is its pose.
@@ -296,8 +388,10 @@ void FrontEnd::follow(const std::shared_ptr<Frame>& frame) {
   result_.aligned = outcome.aligned;
   if (!outcome.ok || outcome.inliers < config_.tracking.min_inliers || (confirming && !outcome.agreed())) {
     note_lost(frame);
+    carry_on(*frame);
   } else if (relocalising) {
     note_relocalised(*frame, outcome);
+    carry_on(*frame);
   } else {
     if (confirming) record(*candidate);
     note_tracked(frame, outcome);
@@ -324,11 +418,13 @@ void FrontEnd::note_relocalised(const Frame& frame, const TrackOutcome& outcome)
   recovery_.set_candidate(relative_to_reference(frame, outcome));
 }
 
-void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome) {
+void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome outcome) {
+  const bool still = stands_still(*frame, outcome);
+  if (still) outcome.T_world_body = tracker_.T_world_body();
   recovery_.note_tracked();
   tracker_.accept(*frame, outcome);
   record(relative_to_reference(*frame, outcome));
-  maybe_keyframe(frame, outcome);
+  if (!still) maybe_keyframe(frame, outcome);
   const MapJudgement& judgement = tracker_.view()->judgement;
   if (judgement.settled(frame->utime) && !waiting_.empty()) pose_waiting_frames();
   const double repeated_share = standstill_.stands() ? 0.0 : repeated_share_;
@@ -336,8 +432,10 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutc
     state_ = State::kSettling;
   else
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
+  rejoin_map(*frame, outcome.T_world_body);
   fill_pose(outcome.T_world_body, outcome.covariance);
   note_errors();
+  if (is_valid(state_)) valid_utime_ = frame->utime;
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
   last_outcome_ = outcome;
   standstill_.note_motion(tracker_.velocity_body(), tracker_.view()->median_depth, frame->utime,
@@ -388,9 +486,19 @@ void FrontEnd::maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOu
   request.T_reference_body = tracker_.view()->S_world_reference().inverse() * outcome.T_world_body;
   tracker_.sightings(&request.sightings);
   tracker_.take_counts(&request.counts);
+  add_wheels(job);
   send_job();
   keyframe_utime_ = frame->utime;
   result_.keyframe = true;
+}
+
+// Samples that no job has had yet, as far back as the history reaches.
+void FrontEnd::add_wheels(MappingJob* job) {
+  const SampleHistory<WheelSample>& history = wheels_.history();
+  std::size_t first = history.size();
+  while (first > 0 && history[first - 1].utime > wheels_sent_utime_) --first;
+  for (std::size_t i = first; i < history.size(); ++i) job->wheels.push_back(history[i]);
+  if (history.size() > 0) wheels_sent_utime_ = history[history.size() - 1].utime;
 }
 
 void FrontEnd::pose_waiting_frames() {
@@ -437,18 +545,40 @@ void FrontEnd::fill_map_state() {
   result_.reset_counter = odometry_.reset_counter();
 }
 
+// Where there is a metre, the lever arm from the tracked body to the calibration's holds.
+void FrontEnd::place_body() {
+  if (!result_.has_pose || result_.scale != ScaleState::kMetric || points_.body_m.isZero(0.0)) return;
+  const SE3 T_tracked_body{Eigen::Quaterniond::Identity(), points_.body_m};
+  result_.T_map_body = result_.T_map_body * T_tracked_body;
+  result_.T_odom_body = result_.T_odom_body * T_tracked_body;
+  Matrix6d carry = Matrix6d::Identity();
+  carry.topRightCorner<3, 3>() = -skew(points_.body_m);
+  result_.velocity_body = carry * result_.velocity_body;
+  for (Matrix6d* m : {&result_.covariance, &result_.velocity_covariance, &result_.odometry.noise})
+    *m = carry * *m * carry.transpose();  // the drift, in odom's axes, is that of any point of the body
+}
+
 void FrontEnd::fill_pose(const SE3& T_map_body, const Matrix6d& covariance) {
   odometry_.advance(T_map_body, result_.utime, std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
+  posed_utime_ = result_.utime;
   result_.has_pose = true;
   result_.T_map_body = T_map_body;
-  if (tracker_.view() != nullptr && tracker_.view()->judgement.metric) result_.scale = ScaleState::kMetric;
+  note_metre();
   result_.T_odom_body = odometry_.T_odom_body();
   result_.map_from_odom = odometry_.map_from_odom(T_map_body);
   const double unit = 1.0 / result_.map_from_odom.scale;
   result_.velocity_body = tracker_.velocity().velocity();
   result_.velocity_body.head<3>() *= unit;
-  result_.velocity_covariance = in_unit(tracker_.velocity().covariance(), unit);
   fill_errors();
+}
+
+void FrontEnd::note_metre() {
+  if (tracker_.view() == nullptr) return;
+  const MapJudgement& judgement = tracker_.view()->judgement;
+  result_.wheels = judgement.wheels;
+  if (!judgement.metric) return;
+  result_.scale = ScaleState::kMetric;
+  result_.metre = judgement.unit_sigma > 0.0 ? MetreSource::kWheels : MetreSource::kSecondCamera;
 }
 
 // Of a pose that adds a frame's motion. One that is held adds none.
@@ -461,6 +591,7 @@ void FrontEnd::note_errors() {
   step.correction = odometry_.correction();
   step.view_sequence = view.sequence;
   step.metric = view.judgement.metric;
+  step.unit_sigma = view.judgement.unit_sigma;
   uncertainty_.advance(step, tracker_.pose_errors());
   fill_errors();
 }
@@ -469,6 +600,10 @@ void FrontEnd::fill_errors() {
   const PoseErrors& errors = tracker_.pose_errors();
   result_.covariance = errors.known ? errors.noise : unknown_covariance();
   result_.odometry = uncertainty_.errors();
+  result_.velocity_covariance = in_unit(tracker_.velocity().covariance(), 1.0 / result_.map_from_odom.scale);
+  if (!std::isfinite(result_.odometry.scale_sigma)) return;
+  const Eigen::Vector3d of_scale = result_.odometry.scale_sigma * result_.velocity_body.head<3>();
+  result_.velocity_covariance.topLeftCorner<3, 3>() += of_scale * of_scale.transpose();
 }
 
 std::vector<std::pair<std::string, std::size_t>> FrontEnd::memory_table() const {

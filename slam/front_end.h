@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@
 
 #include "slam/frame_intake.h"
 #include "slam/frame_result.h"
+#include "slam/fusion/wheel_way.h"
 #include "slam/mapping_port.h"
 #include "slam/measurement.h"
 #include "slam/odometry.h"
@@ -27,6 +29,7 @@
 #include "slam/tracking/tracker.h"
 #include "slam/uncertainty.h"
 #include "slam/validity.h"
+#include "slam/wheel_prior.h"
 
 namespace farpoint::slam {
 
@@ -39,7 +42,8 @@ struct TakeLimit {
 
 class FrontEnd {
  public:
-  FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings);
+  FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* rings,
+           const VehiclePoints& points = {});
 
   void listen(StageListener* listener);
 
@@ -73,37 +77,47 @@ class FrontEnd {
   const FrameResult& step(const std::shared_ptr<Frame>& frame, const TakeLimit& limit);
 
   void take_samples(const Frame& frame, const FrameTaken& up_to);
+  void read_wheels();
   void take_replies(std::int64_t utime, const ReplyLimit& limit);
   void take_reply(const MappingReply& reply);
   void note_counts(const MappingReply& reply);
   void take_view(std::shared_ptr<const LocalView> view);
-  void note_whether_settled();
+  void note_judgement();
   void start_map(const MappingReply& reply);
   [[nodiscard]] MappingJob* begin_job(MappingJobKind kind);
+  void add_wheels(MappingJob* job);
   void send_job() { result_.job = port_.send_job(); }
 
   void initialise(const std::shared_ptr<Frame>& frame);
   void start_from(const InitialPair& pair);
   [[nodiscard]] bool may_start_metric(const Frame& frame) const;
   [[nodiscard]] bool replaces_map(const Frame& frame) const;
-  void skip_blind_frame();
+  void skip_blind_frame(const Frame& frame);
   void hold_pose(const Frame& frame);
+  [[nodiscard]] bool stands_still(const Frame& frame, const TrackOutcome& outcome) const;
+  [[nodiscard]] std::optional<SE3> unseen_motion(const Frame& frame) const;
+  void carry_on(const Frame& frame);
+  void fill_carried(const SE3& T_from_to, double dt_s);
+  void rejoin_map(const Frame& frame, const SE3& T_map_body);
   void follow(const std::shared_ptr<Frame>& frame);
   TrackOutcome search_for(const Frame& frame, Recovery::Search search);
   void note_relocalised(const Frame& frame, const TrackOutcome& outcome);
-  void note_tracked(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
+  void note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome outcome);
   void note_lost(const std::shared_ptr<Frame>& frame);
   void give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& frame);
   void maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void pose_waiting_frames();
   void fill_map_state();
+  void place_body();
   void fill_pose(const SE3& T_map_body, const Matrix6d& covariance);
+  void note_metre();
   void note_errors();
   void fill_errors();
   [[nodiscard]] RecordedFrame relative_to_reference(const Frame& frame, const TrackOutcome& outcome) const;
   void record(const RecordedFrame& frame);
 
   const EstimatorConfig config_;
+  const VehiclePoints points_;
   FrameIntake intake_;
   Initialiser initialiser_;
   Tracker tracker_;
@@ -117,12 +131,20 @@ class FrontEnd {
   Validity validity_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;
+  WheelMotionModel wheel_motion_;
+  WheelPrior wheel_prior_{&tracker_, &wheel_motion_};
+  std::int64_t wheels_read_utime_ = std::numeric_limits<std::int64_t>::min();  // by wheel_motion_
+  std::int64_t wheels_sent_utime_ = std::numeric_limits<std::int64_t>::min();  // to mapping
   StageListener* listener_ = nullptr;
 
   State state_ = State::kInitialising;
   EstimatorCounts counts_;
   FrameResult result_;
-  TrackOutcome last_outcome_;  // accepted
+  TrackOutcome last_outcome_;                  // accepted
+  std::int64_t posed_utime_ = 0;               // of odom's newest pose
+  std::optional<std::int64_t> valid_utime_{};  // of the newest valid pose by images, of this map
+  WheelWay carried_;
+  bool by_wheels_ = false;  // the present frame has its pose by wheels
 
   std::int32_t map_id_ = 0;
   // That a map is being made from; the second is null where one frame's cameras are the pair.

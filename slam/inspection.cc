@@ -15,7 +15,10 @@ std::vector<MapTrajectory> Inspection::trajectories() const {
     auto it =
         std::find_if(out.begin(), out.end(), [&](const MapTrajectory& t) { return t.map_id == r.map_id; });
     if (it == out.end()) it = out.insert(out.end(), MapTrajectory{r.map_id, {}});
-    it->frames.push_back({r.utime, S_world_reference * r.T_reference_body()});
+    SE3 T_map_body = S_world_reference * r.T_reference_body();
+    // Where there is a metre, the lever arm to the calibration's body holds.
+    if (back_end_.mapper().has_metre(r.map_id)) T_map_body.t += T_map_body.q * back_end_.body_point_m();
+    it->frames.push_back({r.utime, T_map_body});
   }
   for (MapTrajectory& t : out)
     std::stable_sort(t.frames.begin(), t.frames.end(),

@@ -17,6 +17,7 @@ MappingJob largest_job(const EstimatorConfig& config) {
   job.keyframe.counts.resize(static_cast<std::size_t>(config.capacity.landmarks));
   job.frames.resize(Initialiser::kHistoryFrames);
   job.seen.resize(features);
+  job.wheels.resize(kWheelsKept);
   return job;
 }
 
@@ -32,6 +33,7 @@ void MappingJob::clear() {
   frames.clear();
   view.reset();
   seen.clear();
+  wheels.clear();
 }
 
 KeptFrame::KeptFrame(const RecordedFrame& frame)

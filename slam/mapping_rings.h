@@ -15,9 +15,13 @@
 #include "slam/map/local_view.h"
 #include "slam/map/request.h"
 #include "slam/mapping/counts.h"
+#include "slam/measurement.h"
 #include "slam/spsc_ring.h"
 
 namespace farpoint::slam {
+
+// Wheel samples that tracking keeps, and most in one job: five seconds at 100 Hz.
+inline constexpr std::size_t kWheelsKept = 512;
 
 enum class MappingJobKind : std::uint8_t {
   kStartMap,    // from two views; one reply
@@ -40,6 +44,8 @@ struct MappingJob {
   std::uint64_t last_before_map = 0;  // number of the second frame of the pair that began the map
   std::shared_ptr<const LocalView> view;
   std::vector<LandmarkHandle> seen;
+  // kStartMap, kKeyframe: wheel samples that tracking has taken since the last such job.
+  std::vector<WheelSample> wheels;
 
   // Gives frames and views back to their pools, and empties every list. Keeps the lists' memory.
   void clear();

@@ -36,6 +36,14 @@ void Odometry::begin_map() {
   map_units_ = 1.0;
 }
 
+void Odometry::begin_unit(const SE3& T_map_body) {
+  ++resets_;
+  T_odom_body_.t *= map_units_;
+  map_units_ = 1.0;
+  aim_at(T_odom_body_, T_map_body);
+  T_odom_body_corrected_ = T_odom_body_;
+}
+
 SE3 Odometry::target(const SE3& T_map_body) const {
   return T_odom_map_ * in_unit(T_map_body, 1.0 / map_units_);
 }
@@ -57,6 +65,12 @@ void Odometry::advance(const SE3& T_map_body, std::int64_t utime, double sigma) 
     take_corrections(T_map_body, utime, sigma / map_units_);
   }
   has_last_ = true;
+}
+
+void Odometry::carry(const SE3& T_from_to) {
+  T_odom_body_ = T_odom_body_ * T_from_to;
+  T_odom_body_corrected_ = T_odom_body_;  // unseen way allows no correction: it would come at once
+  T_map_body_last_ = T_map_body_last_ * in_unit(T_from_to, map_units_);
 }
 
 void Odometry::take_corrections(const SE3& T_map_body, std::int64_t utime, double sigma) {

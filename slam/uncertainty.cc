@@ -33,14 +33,16 @@ Uncertainty::Uncertainty(const Rig& rig) {
   pair_sigma_per_m_ = kPairBias_px / (rig.cameras[0].camera.focal_px() * baseline_m);
 }
 
-void Uncertainty::begin_map() {
+void Uncertainty::begin() {
   errors_ = {};
   begun_ = false;
 }
 
 // A common error of the pair's angles is a common error of all inverse depths: the further landmarks the
 // translation hangs on, the larger a part of it.
-double Uncertainty::scale_sigma(double holding_distance_m) const {
+double Uncertainty::scale_sigma(const OdometryStep& step, double holding_distance_m) const {
+  if (!step.metric) return std::numeric_limits<double>::infinity();
+  if (step.unit_sigma > 0.0) return step.unit_sigma;
   return std::hypot(kBaselineSigma, pair_sigma_per_m_ * holding_distance_m);
 }
 
@@ -48,17 +50,22 @@ void Uncertainty::advance(const OdometryStep& step, const PoseErrors& errors) {
   if (!errors.known) return;
   const double unit = 1.0 / step.map_units;
   errors_.noise = in_unit(errors.noise, unit);
-  errors_.scale_sigma =
-      step.metric ? scale_sigma(errors.holding_distance * unit) : std::numeric_limits<double>::infinity();
+  errors_.scale_sigma = scale_sigma(step, errors.holding_distance * unit);
   if (begun_)
     grow(step, in_unit(errors.exchanged, unit));
   else
-    begin(step);
+    begin_drift(step);
   view_sequence_ = step.view_sequence;
   utime_ = step.utime;
 }
 
-void Uncertainty::begin(const OdometryStep& step) {
+void Uncertainty::carry(const SE3& T_odom_body, std::int64_t utime, const Matrix6d& covariance) {
+  if (!begun_) return;
+  add_drift(carried(T_odom_body, covariance), utime);
+  utime_ = utime;
+}
+
+void Uncertainty::begin_drift(const OdometryStep& step) {
   errors_.drift = carried(step.T_odom_body, errors_.noise);
   errors_.drift_of_second.setZero();
   waiting_.setZero();
@@ -66,7 +73,6 @@ void Uncertainty::begin(const OdometryStep& step) {
 }
 
 void Uncertainty::grow(const OdometryStep& step, const Matrix6d& exchanged) {
-  constexpr double kSecond_s = 1.0;
   const Matrix6d correction = kLastingCorrection * step.correction * step.correction.transpose();
   waiting_ += carried(step.T_odom_body, exchanged);
   Matrix6d growth = carried(step.T_odom_body, correction);
@@ -74,8 +80,13 @@ void Uncertainty::grow(const OdometryStep& step, const Matrix6d& exchanged) {
     growth += waiting_;
     waiting_.setZero();
   }
+  add_drift(growth, step.utime);
+}
+
+void Uncertainty::add_drift(const Matrix6d& growth, std::int64_t utime) {
+  constexpr double kSecond_s = 1.0;
   errors_.drift += growth;
-  const double time_s = 1e-6 * static_cast<double>(step.utime - utime_);
+  const double time_s = 1e-6 * static_cast<double>(utime - utime_);
   errors_.drift_of_second *= 1.0 - std::clamp(time_s / kSecond_s, 0.0, 1.0);
   errors_.drift_of_second += growth;
 }

@@ -21,6 +21,7 @@ struct OdometryStep {
   Vector6d correction = Vector6d::Zero();
   std::uint64_t view_sequence = 0;  // of the view that the frame was tracked against
   bool metric = false;
+  double unit_sigma = 0;  // of the metre, relative, where wheels gave it; else 0
 };
 
 // Tracking's thread; makes no heap call.
@@ -28,18 +29,21 @@ class Uncertainty {
  public:
   explicit Uncertainty(const Rig& rig);
 
-  // A new map: nothing is known of its poses, and nothing has drifted.
-  void begin_map();
+  // The reset counter rises, by a new map or a new unit: nothing has drifted since.
+  void begin();
   // A pose with these errors. While frames hang on the same view, what they exchange of its landmarks waits:
   // the drift rises with the next view.
   void advance(const OdometryStep& step, const PoseErrors& errors);
+  // Another sensor alone moved odom to this pose: its covariance adds to the drift. Body axes, units of odom.
+  void carry(const SE3& T_odom_body, std::int64_t utime, const Matrix6d& covariance);
 
   [[nodiscard]] const OdometryErrors& errors() const { return errors_; }
 
  private:
-  void begin(const OdometryStep& step);
+  void begin_drift(const OdometryStep& step);
   void grow(const OdometryStep& step, const Matrix6d& exchanged);
-  [[nodiscard]] double scale_sigma(double holding_distance_m) const;
+  void add_drift(const Matrix6d& growth, std::int64_t utime);
+  [[nodiscard]] double scale_sigma(const OdometryStep& step, double holding_distance_m) const;
 
   double pair_sigma_per_m_ = std::numeric_limits<double>::infinity();
   OdometryErrors errors_;

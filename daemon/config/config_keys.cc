@@ -238,6 +238,20 @@ std::vector<ConfigKey> make_keys() {
       integer("calibration.min_keyframes", "keyframes", 2, 1000, FIELD(estimator.calibration.min_keyframes)),
       number("odometry.correction_share", "", 0, 1, FIELD(estimator.odometry.correction_share)),
       number("odometry.correction_rad_per_s", "rad/s", 0, 10, FIELD(estimator.odometry.correction_rad_per_s)),
+
+      boolean("wheels.use", FIELD(estimator.wheels.use)),
+      number("wheels.x_m", "m", -100, 100, FIELD(estimator.wheels.x_m)),
+      number("wheels.y_m", "m", -100, 100, FIELD(estimator.wheels.y_m)),
+      number("wheels.z_m", "m", -100, 100, FIELD(estimator.wheels.z_m)),
+      number("wheels.delay_ms", "ms", -1000, 1000, FIELD(estimator.wheels.delay_ms)),
+      number("wheels.factor", "", 0.01, 100, FIELD(estimator.wheels.factor)),
+      number("wheels.scale_sigma", "", 1e-4, 0.5, FIELD(estimator.wheels.scale_sigma)),
+      number("wheels.speed_sigma_mps", "m/s", 1e-4, 10, FIELD(estimator.wheels.speed_sigma_mps)),
+      number("wheels.yaw_rate_sigma_radps", "rad/s", 1e-5, 10, FIELD(estimator.wheels.yaw_rate_sigma_radps)),
+      number("wheels.slip_sigma", "", 0, 0.5, FIELD(estimator.wheels.slip_sigma)),
+      number("wheels.gate_sigmas", "sigma", 0, 100, FIELD(estimator.wheels.gate_sigmas)),
+      number("wheels.max_gap_s", "s", 0.01, 10, FIELD(estimator.wheels.max_gap_s)),
+      number("wheels.blind_s", "s", 0, 600, FIELD(estimator.wheels.blind_s)),
   };
 }
 

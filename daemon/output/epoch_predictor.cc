@@ -49,8 +49,8 @@ void set_sigmas(const FrameOutput& frame, ipc::OdometryEpoch* epoch) {
   epoch->scale_sigma = r.odometry.scale_sigma;
 }
 
-ipc::CanScaleSource scale_source(slam::ScaleState scale) {
-  switch (scale) {
+ipc::CanScaleSource scale_source(const slam::FrameResult& result) {
+  switch (result.scale) {
     case slam::ScaleState::kUnknown:
       return ipc::CanScaleSource::kNone;
     case slam::ScaleState::kAssumed:
@@ -58,7 +58,20 @@ ipc::CanScaleSource scale_source(slam::ScaleState scale) {
     case slam::ScaleState::kMetric:
       break;
   }
-  return ipc::CanScaleSource::kNotAvailable;
+  return result.metre == slam::MetreSource::kWheels ? ipc::CanScaleSource::kWheels
+                                                    : ipc::CanScaleSource::kSecondCamera;
+}
+
+ipc::CanSensorUse wheel_use(const slam::FrameResult& result) {
+  switch (result.wheels) {
+    case slam::WheelTrust::kNone:
+      break;
+    case slam::WheelTrust::kTrusted:
+      return ipc::CanSensorUse::kUsed;
+    case slam::WheelTrust::kContradicted:
+      return ipc::CanSensorUse::kContradicted;
+  }
+  return result.taken.wheels > 0 ? ipc::CanSensorUse::kStarting : ipc::CanSensorUse::kNone;
 }
 
 }  // namespace
@@ -105,7 +118,8 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
   ipc::OdometryEpoch epoch = head(now_us);
   const slam::FrameResult& r = last_.result;
   epoch.scale_state = static_cast<std::uint8_t>(r.scale);
-  epoch.scale_source = scale_source(r.scale);
+  epoch.scale_source = scale_source(r);
+  epoch.wheels = wheel_use(r);
   // A map of unknown unit has no place for the lever arm.
   if (r.scale == slam::ScaleState::kUnknown && body_is_camera_ == ipc::CanYesNo::kNo)
     epoch.body_is_camera = ipc::CanYesNo::kYes;
@@ -118,7 +132,7 @@ ipc::OdometryEpoch EpochPredictor::at(std::int64_t now_us) const {
 
   epoch.pose_valid = true;
   epoch.velocity_valid = r.knows_velocity();
-  epoch.from_vision = r.has_pose && age_us <= frame_period_us();
+  epoch.from_vision = r.has_pose && r.from_vision && age_us <= frame_period_us();
   epoch.predicted = age_us > 0;
   epoch.quality = r.quality;
   const FrameOutput now = extrapolate(last_, epoch.age_s);

@@ -130,7 +130,7 @@ odometry_t make_odometry(const FrameOutput& frame) {
   m.quality = quality_of(frame);
   m.valid = frame.valid ? 1 : 0;
   m.velocity_valid = moves ? 1 : 0;
-  m.from_vision = r.has_pose ? 1 : 0;
+  m.from_vision = r.has_pose && r.from_vision ? 1 : 0;
   m.map_id = r.map_id;
   m.reset_counter = static_cast<std::int32_t>(r.reset_counter);
   m.boot_counter = frame.boot_counter;

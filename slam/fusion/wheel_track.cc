@@ -85,6 +85,10 @@ WheelSample WheelTrack::with_sigmas(WheelSample s) const {
   return s;
 }
 
+bool WheelTrack::is_gap(std::int64_t from_utime, std::int64_t to_utime) const {
+  return static_cast<double>(to_utime - from_utime) * kSeconds > options_.max_gap_s;
+}
+
 // Index of the first sample later than a time; size() where there is none.
 std::size_t WheelTrack::first_after(std::int64_t utime) const {
   std::size_t low = 0, high = size_;
@@ -110,13 +114,44 @@ std::optional<WheelMotion> WheelTrack::between(std::int64_t from_utime, std::int
   for (;; ++next) {
     const WheelSample& before = sample(next - 1);
     const WheelSample& after = sample(next);
-    if (static_cast<double>(after.utime - before.utime) * kSeconds > options_.max_gap_s) return std::nullopt;
+    if (is_gap(before.utime, after.utime)) return std::nullopt;
     const bool last = after.utime >= to_utime;
     const WheelSample end = last ? interpolated(before, after, to_utime) : after;
     append(at, end, options_.sigma_slip_m_per_s, &motion);
     if (last) return motion;
     at = end;
   }
+}
+
+std::optional<WheelMotion> WheelTrack::up_to(std::int64_t from_utime, std::int64_t to_utime) const {
+  if (size_ == 0 || from_utime >= to_utime) return std::nullopt;
+  const WheelSample& newest = sample(size_ - 1);
+  if (to_utime <= newest.utime) return between(from_utime, to_utime);
+  if (is_gap(newest.utime, to_utime)) return std::nullopt;
+  WheelMotion motion;
+  motion.from_utime = from_utime;
+  if (from_utime < newest.utime) {
+    const std::optional<WheelMotion> known = between(from_utime, newest.utime);
+    if (!known) return std::nullopt;
+    motion = *known;
+  }
+  WheelSample start = newest, end = newest;
+  start.utime = std::max(from_utime, newest.utime);
+  end.utime = motion.to_utime = to_utime;
+  append(start, end, options_.sigma_slip_m_per_s, &motion);
+  return motion;
+}
+
+std::optional<WheelSample> WheelTrack::fastest(std::int64_t from_utime, std::int64_t to_utime) const {
+  if (size_ == 0 || sample(0).utime > from_utime || is_gap(sample(size_ - 1).utime, to_utime))
+    return std::nullopt;
+  WheelSample fastest{.utime = to_utime};
+  for (std::size_t i = first_after(from_utime); i < size_ && sample(i).utime <= to_utime; ++i) {
+    fastest.speed_m_per_s = std::max(fastest.speed_m_per_s, std::fabs(sample(i).speed_m_per_s));
+    fastest.yaw_rate_rad_per_s =
+        std::max(fastest.yaw_rate_rad_per_s, std::fabs(sample(i).yaw_rate_rad_per_s));
+  }
+  return fastest;
 }
 
 }  // namespace farpoint::slam

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "slam/map/wheel_motion.h"
 #include "slam/measurement.h"
 
 namespace farpoint::slam {
@@ -19,14 +20,6 @@ struct WheelOptions {
   double sigma_yaw_rate_rad_per_s = 0.01;
   // Motion across the rolling direction, as an error of each reading.
   double sigma_slip_m_per_s = 0.05;
-};
-
-// Motion of the body in the plane of its x and y axes at `from_utime`.
-struct WheelMotion {
-  std::int64_t from_utime = 0, to_utime = 0;
-  Eigen::Vector2d displacement_m = Eigen::Vector2d::Zero();
-  double yaw_rad = 0;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // displacement, yaw; m^2, m rad, rad^2
 };
 
 struct WheelCounts {
@@ -44,9 +37,14 @@ class WheelTrack {
   bool add(const WheelSample& sample);
   void clear() { size_ = 0; }
 
-  // The motion from one time to a later one. Samples are interpolated linearly in time, never extrapolated.
-  // Empty where the ring does not reach from `from_utime` to `to_utime` without a gap.
+  // The motion from one time to a later one. Samples are interpolated linearly in time. Empty where the ring
+  // does not reach from `from_utime` to `to_utime` without a gap.
   [[nodiscard]] std::optional<WheelMotion> between(std::int64_t from_utime, std::int64_t to_utime) const;
+  // The same for the present: the newest reading holds until `to_utime`, for max_gap_s at most.
+  [[nodiscard]] std::optional<WheelMotion> up_to(std::int64_t from_utime, std::int64_t to_utime) const;
+  // Largest speed and yaw rate of the readings from a time on, by magnitude. Empty where the ring does not
+  // reach back so far, or its newest reading is more than max_gap_s older than `to_utime`.
+  [[nodiscard]] std::optional<WheelSample> fastest(std::int64_t from_utime, std::int64_t to_utime) const;
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const WheelCounts& counts() const { return counts_; }
@@ -54,6 +52,7 @@ class WheelTrack {
  private:
   // Ascending in time; 0 is the oldest.
   [[nodiscard]] const WheelSample& sample(std::size_t i) const { return ring_[(first_ + i) % ring_.size()]; }
+  [[nodiscard]] bool is_gap(std::int64_t from_utime, std::int64_t to_utime) const;
   [[nodiscard]] std::size_t first_after(std::int64_t utime) const;
   [[nodiscard]] WheelSample with_sigmas(WheelSample sample) const;
 

@@ -4,6 +4,13 @@
 namespace farpoint::slam {
 
 void ChainLink::append(const ChainLink& next) {
+  // A motion of which one part slipped measures nothing.
+  const bool known = wheels && next.wheels && !wheels_slipped && !next.wheels_slipped;
+  if (known)
+    wheels->append(*next.wheels);
+  else
+    wheels.reset();
+  wheels_slipped = false;
   to_utime = next.to_utime;
   removed_keyframes += next.removed_keyframes + 1;
 }

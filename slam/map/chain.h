@@ -4,9 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "slam/map/landmark.h"
+#include "slam/map/wheel_motion.h"
 
 namespace farpoint::slam {
 
@@ -15,6 +17,8 @@ namespace farpoint::slam {
 struct ChainLink {
   std::int64_t from_utime = 0, to_utime = 0;
   std::uint32_t removed_keyframes = 0;  // that stood in between
+  std::optional<WheelMotion> wheels{};  // empty: unknown
+  bool wheels_slipped = false;          // the images contradict it
 
   [[nodiscard]] double duration_s() const { return static_cast<double>(to_utime - from_utime) * 1e-6; }
   // Joins this link with the one behind it; the keyframe between them is removed.

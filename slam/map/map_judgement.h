@@ -10,6 +10,13 @@
 
 namespace farpoint::slam {
 
+// What the images say of the wheels.
+enum class WheelTrust : std::uint8_t {
+  kNone,          // not judged: no samples, no motion, or no metres to measure by
+  kTrusted,       // wheels and images agree
+  kContradicted,  // another factor than the configuration allows, or another turn
+};
+
 struct MapJudgement {
   // After an unsound adjustment: time over which the map must be sound, until its poses are used again.
   static constexpr double kSoundTime_s = 1.5;
@@ -25,6 +32,9 @@ struct MapJudgement {
   double scale_change = 1.0;              // factor of the unit by the last adjustment
   double further_sigma_factor = 1.0;      // of the further cameras' measurements (mapping/further_trust.h)
   Refusal unsound{};                      // what the last adjustment left too much of
+  WheelTrust wheels = WheelTrust::kNone;
+  double wheel_factor = 1.0;  // metres driven in one that the wheels tell
+  double unit_sigma = 0.0;    // of the metre, relative, where wheels gave it; 0 without them
 
   // How long the map has been sound, as of a frame at `utime`. The time since the last adjustment counts: a
   // vehicle that stands makes no keyframes.

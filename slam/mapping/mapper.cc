@@ -180,7 +180,7 @@ void Mapper::make_landmarks(KeyframeHandle keyframe) {
   const std::uint64_t made = counts_.landmarks_made;
   landmark_maker_.process(
       keyframe, neighbours_of(map_, keyframe, static_cast<std::size_t>(config_.mapping.neighbours)));
-  if (settling_.metric()) rig_depth_.measure(keyframe);
+  if (metric_by_rig()) rig_depth_.measure(keyframe);
   landmark_maker_.evict_bearings(keyframe);
   if (counts_.landmarks_made > made) probation_.admit_made_at(keyframe);
 }
@@ -203,11 +203,12 @@ std::shared_ptr<const LocalView> Mapper::refine() {
   const bool optimised = optimise(newest, config_.mapping.iterations);
   // What bends the map would bend the calibration too.
   if (optimised && config_.calibration.refine) {
-    if (settling_.metric())
+    if (metric_by_rig())
       refine_rig();
     else if (settling_.fits_well())
       refine_calibration();
   }
+  if (optimised && motion_ != nullptr) judge_motion(newest);
   const StageSpan span(listener_, Stage::kCulling);
   forget(newest);
   map_.update_covisibility(newest);
@@ -220,6 +221,7 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   window_.build(centre, settling_.further_sigma_factor());
   BundleProblem& problem = window_.problem();
   if (problem.points.empty()) return false;
+  if (motion_ != nullptr) motion_->add_to(map_, window_.pose_index(), settling_.judgement(), &problem);
   BundleOptions options;
   options.iterations = iterations;
   BundleSummary summary;
@@ -233,6 +235,22 @@ bool Mapper::optimise(KeyframeHandle centre, int iterations) {
   const std::int64_t utime = map_.keyframes()[centre].utime;
   settling_.note_adjustment(soundness, window_.take_back(), counts_.calibration_contradicted, utime);
   return true;
+}
+
+void Mapper::judge_motion(KeyframeHandle newest) {
+  const MotionVerdict verdict = motion_->judge(&map_, newest, settling_.judgement());
+  if (verdict.metres_per_unit) {
+    Sim3 to_metres;
+    to_metres.scale = *verdict.metres_per_unit;
+    const std::int32_t map_id = map_.keyframes()[newest].map_id;
+    map_.transform(map_id, to_metres);
+    if (!has_metre(map_id)) metric_maps_.push_back(map_id);
+  }
+  settling_.note_motion(verdict);
+}
+
+bool Mapper::has_metre(std::int32_t map_id) const {
+  return std::binary_search(metric_maps_.begin(), metric_maps_.end(), map_id);
 }
 
 void Mapper::refine_calibration() {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "slam/map/local_view.h"
 #include "slam/map/map.h"
@@ -24,6 +25,7 @@
 #include "slam/mapping/settling.h"
 #include "slam/mapping/view_builder.h"
 #include "slam/mapping/window.h"
+#include "slam/solver/motion_factors.h"
 #include "slam/solver/schur_solver.h"
 #include "slam/stages.h"
 
@@ -38,6 +40,9 @@ class Mapper {
 
   // The listener must outlive this; null ends listening.
   void listen(StageListener* listener) { listener_ = listener; }
+
+  // Motion between keyframes by another sensor, which must outlive this; null: none.
+  void use_motion(MotionFactors* motion) { motion_ = motion; }
 
   // Starts a new map from two views. Null where too few points survive adjustment; the map is then discarded.
   // From one frame that two cameras show, where the pair has no second: such a map is metric.
@@ -58,6 +63,8 @@ class Mapper {
   void transform_map(std::int32_t map_id, const Sim3& S_new_old) { map_.transform(map_id, S_new_old); }
 
   [[nodiscard]] const Map& map() const { return map_; }
+  // Whether another sensor has made the map's unit the metre.
+  [[nodiscard]] bool has_metre(std::int32_t map_id) const;
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   [[nodiscard]] const Calibrator& calibrator() const { return calibrator_; }
   [[nodiscard]] std::size_t view_bytes() const { return view_builder_.bytes(); }
@@ -75,6 +82,9 @@ class Mapper {
   void count_virtual_points();
   // Local bundle adjustment. False where nothing was optimised or the solution is unusable.
   bool optimise(KeyframeHandle centre, int iterations);
+  void judge_motion(KeyframeHandle newest);
+  // The unit is the metre by the cameras' own baseline.
+  [[nodiscard]] bool metric_by_rig() const { return rig_calibrator_.has_value() && settling_.metric(); }
   void refine_calibration();
   void refine_rig();
   void forget(KeyframeHandle newest);
@@ -96,6 +106,8 @@ class Mapper {
   Calibrator calibrator_;
   std::optional<RigCalibrator> rig_calibrator_;  // of two cameras
   ViewBuilder view_builder_;
+  MotionFactors* motion_ = nullptr;
+  std::vector<std::int32_t> metric_maps_;  // by motion_, ascending
   StageListener* listener_ = nullptr;
 };
 

@@ -45,4 +45,11 @@ void Settling::note_adjustment(const Soundness& soundness, std::optional<double>
   if (steady_run_ >= kSteadyRun) j.steady = true;
 }
 
+void Settling::note_motion(const MotionVerdict& verdict) {
+  judgement_.wheels = verdict.trust;
+  judgement_.wheel_factor = verdict.wheel_factor;
+  judgement_.unit_sigma = verdict.unit_sigma;
+  if (verdict.metres_per_unit) judgement_.metric = true;
+}
+
 }  // namespace farpoint::slam

@@ -8,6 +8,7 @@
 #include "slam/map/map_judgement.h"
 #include "slam/mapping/further_trust.h"
 #include "slam/mapping/soundness.h"
+#include "slam/solver/motion_factors.h"
 
 namespace farpoint::slam {
 
@@ -30,6 +31,9 @@ class Settling {
   // the map unsound at once, for MapJudgement::kSoundTime_s.
   void note_adjustment(const Soundness& soundness, std::optional<double> scale_change,
                        bool calibration_contradicted, std::int64_t utime);
+
+  // Takes in what another sensor says. Its metre is the map's unit from here on.
+  void note_motion(const MotionVerdict& verdict);
 
   // Of the further cameras' sigmas.
   [[nodiscard]] double further_sigma_factor() const { return judgement_.further_sigma_factor; }

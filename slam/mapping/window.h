@@ -29,6 +29,8 @@ class Window {
   [[nodiscard]] BundleProblem& problem() { return problem_; }
   [[nodiscard]] const BundleProblem& problem() const { return problem_; }
   [[nodiscard]] const std::vector<KeyframeHandle>& keyframes() const { return keyframes_; }
+  // By keyframe slot: index of its pose in the problem, or -1.
+  [[nodiscard]] const std::vector<int>& pose_index() const { return pose_index_; }
   // By point of the problem.
   [[nodiscard]] const std::vector<LandmarkHandle>& landmarks() const { return landmarks_; }
 

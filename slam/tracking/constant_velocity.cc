@@ -71,6 +71,11 @@ void ConstantVelocity::accept_on_trial(const SE3& T_world_body, std::int64_t uti
   newest_ = moved(confirmed_, T_world_body, utime, kLongestGap_s);
 }
 
+void ConstantVelocity::carry(const SE3& T_from_to, std::int64_t utime) {
+  confirmed_ = moved(confirmed_, confirmed_.T_world_body * T_from_to, utime, kLongestGap_s);
+  newest_ = confirmed_;
+}
+
 PosePrior ConstantVelocity::predict(std::int64_t utime) const {
   PosePrior prior;
   prior.T_world_body = newest_.T_world_body;

@@ -43,6 +43,9 @@ class ConstantVelocity final : public MotionModel {
   // Takes a pose as newest only; its velocity is measured from the confirmed pose.
   void accept_on_trial(const SE3& T_world_body, std::int64_t utime);
 
+  // The body moved on unseen, until `utime`: the confirmed pose moves with it and is the newest one.
+  void carry(const SE3& T_from_to, std::int64_t utime);
+
   // The newest pose moved on by its velocity, without information. The newest pose itself where there is no
   // velocity, or `utime` lies before it or more than kLongestStep_s after it.
   [[nodiscard]] PosePrior predict(std::int64_t utime) const override;

@@ -71,6 +71,9 @@ class Tracker {
   // confirmed pose until the next accept().
   void accept_on_trial(const Frame& frame, const TrackOutcome& outcome);
 
+  // The body moved on unseen, by another sensor: relocalise() searches from there.
+  void carry(const SE3& T_from_to, std::int64_t utime) { motion_.carry(T_from_to, utime); }
+
   // Inlier sightings of the last search.
   void sightings(std::vector<Sighting>* out) const;
   // Counts of the accepted frames since the last call.
@@ -83,6 +86,7 @@ class Tracker {
   // Of the last accepted pose.
   [[nodiscard]] const PoseErrors& pose_errors() const { return errors_.errors(); }
 
+  [[nodiscard]] const ConstantVelocity& motion() const { return motion_; }
   [[nodiscard]] const SE3& T_world_body() const { return motion_.newest().T_world_body; }
   [[nodiscard]] const std::vector<Match>& matches() const { return matcher_.matches(); }
   // Velocity between the last two accepted frames, body axes: translation (map units a second), rotation (rad

@@ -87,7 +87,10 @@ OdometryEpoch random_epoch(std::mt19937_64& rng) {
   e.map_id = static_cast<std::int32_t>(rng() % 256);
   e.levelled = rng() % 2 == 0 ? CanYesNo::kYes : CanYesNo::kNo;
   e.body_is_camera = rng() % 2 == 0 ? CanYesNo::kYes : CanYesNo::kNo;
-  e.scale_source = rng() % 2 == 0 ? CanScaleSource::kNone : CanScaleSource::kAssumed;
+  constexpr std::array kSources{CanScaleSource::kNone, CanScaleSource::kAssumed,
+                                CanScaleSource::kSecondCamera, CanScaleSource::kWheels};
+  e.scale_source = kSources[rng() % kSources.size()];
+  e.wheels = static_cast<CanSensorUse>(rng() % 4);
   e.scale_sigma = uniform(0, 4);
   e.quality = static_cast<int>(rng() % 101);
   e.age_s = uniform(0, 0.13);

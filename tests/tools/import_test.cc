@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Importers: what they find in recordings of each layout, and what they say about malformed ones.
+// Long file: the layouts share the recordings that are made here, and their lists of damages.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -135,6 +136,34 @@ TEST(ImportKitti, GpsIsTruthOfPositionOnly) {
   ASSERT_EQ(r.truth.size(), 2U);
   EXPECT_EQ(r.truth[1].utime, 125'000);
   EXPECT_EQ(r.truth[1].T_world_body.t, Eigen::Vector3d(1.5, 2.5, 0.0));
+}
+
+TEST(ImportKitti, WheelsBesideTheTimesBecomeSamples) {
+  const ScratchFolder root;
+  make_kitti(root.path());
+  EXPECT_TRUE(read_kitti(root.path(), "07").wheels.empty());
+  put(root / "sequences/07/wheels.csv",
+      "#seconds,speed_mps,yaw_rate_rad_per_s\n0.05,4.5,-0.25\n0.09,4.75,0.125\n");
+  const Recording r = read_kitti(root.path(), "07");
+  ASSERT_EQ(r.wheels.size(), 2U);
+  EXPECT_EQ(r.wheels[1].utime, 90'000);
+  EXPECT_EQ(r.wheels[1].speed_mps, 4.75);
+  EXPECT_EQ(r.wheels[0].yaw_rate_radps, -0.25);
+}
+
+TEST(ImportKitti, DamagedWheelsAreNamed) {
+  const ScratchFolder root;
+  make_kitti(root.path());
+  const auto complaint = [&] {
+    return complaint_of([&] { (void)read_kitti(root.path(), "07", Damaged::kRefused); });
+  };
+  put(root / "sequences/07/wheels.csv", "0.05,4.5\n");
+  expect_all_in(complaint(), {"wheels.csv:1:", "seconds,speed_mps,yaw_rate_rad_per_s"});
+  put(root / "sequences/07/wheels.csv", "0.05,4.5,0\n0.05,4.5,0\n");
+  expect_all_in(complaint(), {"wheels.csv:2:", "after the one above"});
+  put(root / "sequences/07/wheels.csv", "0.05,fast,0\n");
+  expect_all_in(complaint(), {"wheels.csv:1:", "'fast'"});
+  EXPECT_TRUE(read_kitti(root.path(), "07").wheels.empty()) << "imported without this sensor";
 }
 
 TEST(ImportKitti, MonocularWithoutTruthAndMissingImages) {

@@ -260,7 +260,8 @@ void add_import_command(CLI::App* app, Action* action) {
   kitti->footer(
       "Reads calib.txt, times.txt (absent: 0.1 s apart), image_0, image_1 where there is one, and truth "
       "from\n"
-      "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').");
+      "DIR/poses/SEQUENCE.txt or, for positions only, gps_xy.txt in the sequence ('seconds east north').\n"
+      "wheels.csv in the sequence ('#seconds,speed_mps,yaw_rate_rad_per_s') becomes WHEELS.");
   kitti->callback([=] {
     *action = [=] {
       return write_and_report(read_kitti(options->folder, options->sequence, options->damaged()), *options);

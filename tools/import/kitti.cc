@@ -169,6 +169,19 @@ void read_gps(const fs::path& file, Recording* recording) {
   }
 }
 
+void read_wheels(const fs::path& file, Recording* recording) {
+  const FieldFile text(file, kCommaAndBlanks);
+  for (const FieldLine& line : text.lines()) {
+    line.require_fields(3, "seconds,speed_mps,yaw_rate_rad_per_s");
+    const RecordingWheels sample{line.utime_from_seconds_at(0, "the sample's time"),
+                                 line.number_at(1, "the speed"), line.number_at(2, "the yaw rate")};
+    if (!recording->wheels.empty() && sample.utime <= recording->wheels.back().utime) {
+      line.fail("expected a time after the one above, found '" + std::string(line.text(0)) + "'");
+    }
+    recording->wheels.push_back(sample);
+  }
+}
+
 // Names of the sequences that exist, for an error.
 std::string sequences_of(const fs::path& root) {
   constexpr std::size_t kMostShown = 30;
@@ -217,6 +230,9 @@ Recording read_kitti(const fs::path& root, const std::string& sequence, Damaged 
     }
   };
   read_sensor(damaged, read_truth, &recording.truth, &recording);
+  if (const fs::path wheels = folder / "wheels.csv"; fs::exists(wheels))
+    read_sensor(
+        damaged, [&] { read_wheels(wheels, &recording); }, &recording.wheels, &recording);
   complete_cameras(folder / "calib.txt", &recording);
   return recording;
 }
