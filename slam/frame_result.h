@@ -32,9 +32,6 @@ enum class State : std::uint8_t {
 
 enum class ScaleState : std::uint8_t { kUnknown = 0, kAssumed = 1, kMetric = 2 };
 
-// What a metric scale comes from.
-enum class MetreSource : std::uint8_t { kNone, kSecondCamera, kWheels };
-
 // An image of one camera of the rig.
 struct CameraImage {
   int camera = 0;

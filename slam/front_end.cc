@@ -578,7 +578,7 @@ void FrontEnd::note_metre() {
   result_.wheels = judgement.wheels;
   if (!judgement.metric) return;
   result_.scale = ScaleState::kMetric;
-  result_.metre = judgement.unit_sigma > 0.0 ? MetreSource::kWheels : MetreSource::kSecondCamera;
+  result_.metre = judgement.unit_sigma > 0.0 ? MetreSource::kWheels : MetreSource::kCameras;
 }
 
 // Of a pose that adds a frame's motion. One that is held adds none.

@@ -18,9 +18,6 @@
 
 namespace farpoint::slam {
 
-// Who says how long a metre is.
-enum class MetreSource : std::uint8_t { kWheels, kCameras };
-
 class WheelFusion final : public MotionFactors {
  public:
   // Driving time over which wheels and images are compared: longer than a wheel slips, shorter than the

@@ -17,6 +17,9 @@ enum class WheelTrust : std::uint8_t {
   kContradicted,  // another factor than the configuration allows, or another turn
 };
 
+// What a map's metre comes from.
+enum class MetreSource : std::uint8_t { kNone, kCameras, kWheels };
+
 struct MapJudgement {
   // After an unsound adjustment: time over which the map must be sound, until its poses are used again.
   static constexpr double kSoundTime_s = 1.5;
