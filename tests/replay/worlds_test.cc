@@ -24,7 +24,7 @@ bool virtual_points_reach_further(int seed) {
   for (const char* mode : {"baseline", "vmp"}) {
     const std::string out = work.path(std::string(mode) + ".lcm");
     EXPECT_EQ(run((kBin / "farpointd").string() + " --replay " + log + " --lockstep --output " + out +
-                  " --set landmarks.mode=" + mode),
+                  " --set camera.use=one --set wheels.use=false --set landmarks.mode=" + mode),
               0);
     runs += " " + out;
   }
