@@ -58,7 +58,7 @@ TEST_F(UncertaintyTest, ANewMapsIsUnknownUntilAPoseSaysIt) {
   EXPECT_TRUE(uncertainty.errors().noise.array().isNaN().all());
   uncertainty.advance(step(2, 1), errors(0.01, 0.5));
   EXPECT_TRUE(drift().allFinite());
-  uncertainty.begin_map();
+  uncertainty.begin();
   EXPECT_TRUE(drift().array().isNaN().all());
 }
 
