@@ -182,6 +182,7 @@ void LiveRun::open_recorder_aside() {
     recording_.emplace(Recorder::kThread, config_.realtime, ThreadConfig{}, nullptr,
                        [recorder = recorder.get()] { recorder->run(); });
     for (CameraSource& camera : cameras_) camera.record_to(recorder.get());
+    if (wheels_) wheels_->record_to(recorder.get());
     recorder_.set(std::move(recorder));
   });
 }
@@ -209,6 +210,7 @@ void LiveRun::open_wheels() {
   try {
     auto bus = std::make_unique<drivers::SocketCan>(named ? *options_.can_interface : can.interface, options);
     wheels_ = std::make_unique<WheelSource>(std::move(bus), std::move(*reader));
+    wheels_->feed(&session_->estimator(), config_.estimator.wheels);
     outputs_.publish_wheels_of(wheels_.get());
   } catch (const std::runtime_error& error) {
     spdlog::warn("{}; the run goes on without wheel speeds", error.what());

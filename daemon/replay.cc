@@ -119,7 +119,7 @@ int replay_with_threads(const Options& options, const Config& config, const Thre
   SourceFrame first;
   if (!source.next(&first, &clock)) throw InputError(source.name() + ": no image");
   const std::unique_ptr<Session> session = session_of(config, source, &outputs, "threaded", true);
-  MeasurementFeed feed(&session->estimator());
+  MeasurementFeed feed(&session->estimator(), config.estimator.wheels);
   source.feed_to(&feed);
   PacedSource paced(&source, first, *options.speed);
   RealtimeReport realtime(config.realtime);

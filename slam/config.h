@@ -98,6 +98,7 @@ struct OdometryConfig {
 struct WheelConfig {
   bool use = true;
   double x_m = 0, y_m = 0, z_m = 0;    // where on the body the speed is measured, body axes
+  double track_m = 0;                  // between left and right wheel; 0: unknown
   double delay_ms = 0;                 // by which the samples' times are late
   double factor = 1;                   // metres driven in one that the wheels tell
   double scale_sigma = 0.02;           // of the factor, relative

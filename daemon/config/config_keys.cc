@@ -243,6 +243,7 @@ std::vector<ConfigKey> make_keys() {
       number("wheels.x_m", "m", -100, 100, FIELD(estimator.wheels.x_m)),
       number("wheels.y_m", "m", -100, 100, FIELD(estimator.wheels.y_m)),
       number("wheels.z_m", "m", -100, 100, FIELD(estimator.wheels.z_m)),
+      number("wheels.track_m", "m", 0, 10, FIELD(estimator.wheels.track_m)),
       number("wheels.delay_ms", "ms", -1000, 1000, FIELD(estimator.wheels.delay_ms)),
       number("wheels.factor", "", 0.01, 100, FIELD(estimator.wheels.factor)),
       number("wheels.scale_sigma", "", 1e-4, 0.5, FIELD(estimator.wheels.scale_sigma)),

@@ -12,7 +12,8 @@ namespace farpoint::daemon {
 class MeasurementFeed {
  public:
   // The estimator outlives this.
-  explicit MeasurementFeed(slam::Estimator* estimator) : estimator_(*estimator) {}
+  MeasurementFeed(slam::Estimator* estimator, const slam::WheelConfig& wheels)
+      : estimator_(*estimator), wheels_(wheels) {}
 
   // One thread a sensor; makes no heap call. The estimator counts late samples and those that find its queue
   // full. Values are finite (drivers::LogSource) except unknown ones of WHEELS, which get an infinite sigma.
@@ -24,13 +25,14 @@ class MeasurementFeed {
 
  private:
   slam::Estimator& estimator_;
+  const slam::WheelConfig wheels_;
   std::int64_t wheels_without_value_ = 0;
 };
 
 // Axes and units are the message's.
 [[nodiscard]] slam::ImuSample make_sample(const imu_t& message);
 // An unknown value (NaN) becomes zero with an infinite sigma; an unknown sigma (negative) becomes zero, the
-// receiver's own.
-[[nodiscard]] slam::WheelSample make_sample(const wheels_t& message);
+// receiver's own. Without a yaw rate the wheels of one axle give it where `config` has their track.
+[[nodiscard]] slam::WheelSample make_sample(const wheels_t& message, const slam::WheelConfig& config);
 
 }  // namespace farpoint::daemon

@@ -4,9 +4,17 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "drivers/can/wheel_reader.h"
 #include "ipc/channels.h"
 
 namespace farpoint::daemon {
+
+namespace {
+
+// Two seconds of wheels at 100 Hz: longer than a disk makes the recorder wait.
+constexpr std::size_t kWaitingWheels = 256;
+
+}  // namespace
 
 Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration, int waiting_images)
     : name(ipc::kCameraChannelPrefix + std::to_string(camera)),
@@ -22,7 +30,7 @@ Recorder::Channel::Channel(int camera, const camera_calibration_t& calibration, 
 }
 
 Recorder::Recorder(const std::string& path, const RecordConfig& limits, const calibration_t& calibration)
-    : recording_(path, limits, calibration) {
+    : recording_(path, limits, calibration), wheels_(kWaitingWheels, drivers::wheels_with_room()) {
   for (const camera_calibration_t& camera : calibration.cameras)
     channels_.emplace_back(static_cast<int>(channels_.size()), camera, limits.waiting_images);
 }
@@ -40,6 +48,17 @@ void Recorder::offer(int camera, const ipc::GreyImage& image, const drivers::Cam
   arrived_.notify();
 }
 
+void Recorder::offer(const wheels_t& message) {
+  wheels_t* slot = wheels_.begin_push();
+  if (slot == nullptr) {
+    left_out_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  *slot = message;  // as many wheels as there is room for
+  wheels_.end_push();
+  arrived_.notify();
+}
+
 void Recorder::run() {
   for (;;) {
     const std::uint32_t seen = arrived_.seen();
@@ -51,19 +70,37 @@ void Recorder::run() {
 }
 
 void Recorder::write_all() {
-  while (Channel* channel = oldest()) {
-    Image* image = channel->images.front();
-    image_t& message = channel->message;
-    message.utime = image->frame.utime;
-    message.sequence = image->frame.sequence;
-    message.exposure_us = image->frame.exposure_us;
-    message.gain = image->frame.gain;
-    message.data.assign(image->pixels.begin(), image->pixels.end());
-    channel->images.pop();
-    ipc::encode(message, &encoded_);
-    const bool stored = recording_.write(channel->name, message.utime, encoded_);
-    (stored ? written_ : left_out_).fetch_add(1, std::memory_order_relaxed);
+  for (;;) {
+    Channel* channel = oldest();
+    if (write_wheels_before(channel)) continue;
+    if (channel == nullptr) return;
+    write_image(channel);
   }
+}
+
+void Recorder::write_image(Channel* channel) {
+  Image* image = channel->images.front();
+  image_t& message = channel->message;
+  message.utime = image->frame.utime;
+  message.sequence = image->frame.sequence;
+  message.exposure_us = image->frame.exposure_us;
+  message.gain = image->frame.gain;
+  message.data.assign(image->pixels.begin(), image->pixels.end());
+  channel->images.pop();
+  ipc::encode(message, &encoded_);
+  const bool stored = recording_.write(channel->name, message.utime, encoded_);
+  (stored ? written_ : left_out_).fetch_add(1, std::memory_order_relaxed);
+}
+
+bool Recorder::write_wheels_before(Channel* channel) {
+  const wheels_t* message = wheels_.front();
+  if (message == nullptr) return false;
+  if (channel != nullptr && channel->images.front()->frame.utime < message->utime) return false;
+  ipc::encode(*message, &encoded_);
+  if (!recording_.write(ipc::kWheelsChannel, message->utime, encoded_))
+    left_out_.fetch_add(1, std::memory_order_relaxed);
+  wheels_.pop();
+  return true;
 }
 
 Recorder::Channel* Recorder::oldest() {

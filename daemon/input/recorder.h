@@ -30,6 +30,8 @@ class Recorder {
 
   // Capture thread of this camera.
   void offer(int camera, const ipc::GreyImage& image, const drivers::CameraFrame& frame);
+  // Thread of the wheels. Makes no heap call.
+  void offer(const wheels_t& message);
   // Recorder's thread: writes until stop(), then the remaining images. Between images it finishes what a
   // killed run left.
   void run();
@@ -41,7 +43,7 @@ class Recorder {
   // Call after close(): the files written.
   [[nodiscard]] std::vector<std::string> files() const { return recording_.files(); }
 
-  // Of all cameras.
+  // Images of all cameras. Measurements of the wheels that find no room are left out too.
   [[nodiscard]] std::int64_t written() const { return written_.load(); }
   [[nodiscard]] std::int64_t left_out() const { return left_out_.load(); }
 
@@ -58,12 +60,16 @@ class Recorder {
     slam::SpscRing<Image> images;
   };
   void write_all();
+  void write_image(Channel* channel);
+  // The oldest measurement of the wheels, if it is not after that image. Null: no image waits.
+  bool write_wheels_before(Channel* channel);
   // Returns the channel with the oldest waiting image; null without one.
   [[nodiscard]] Channel* oldest();
 
   Recording recording_;
   std::vector<std::uint8_t> encoded_;
   std::deque<Channel> channels_;  // rings do not move
+  slam::SpscRing<wheels_t> wheels_;
   Notifier arrived_;
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> written_{0}, left_out_{0};

@@ -9,20 +9,11 @@
 #include "daemon/system/stage_clock.h"
 
 namespace farpoint::daemon {
-namespace {
-
-// A message sized for the most wheels, so that no measurement uses the heap.
-wheels_t with_room() {
-  constexpr std::size_t kMostWheels = 4;
-  wheels_t message{};
-  message.wheel_speed.resize(kMostWheels);
-  return message;
-}
-
-}  // namespace
-
 WheelSource::WheelSource(std::unique_ptr<drivers::SocketCan> bus, drivers::WheelReader reader)
-    : bus_(std::move(bus)), reader_(std::move(reader)), ring_(kWaiting, with_room()), spare_(with_room()) {}
+    : bus_(std::move(bus)),
+      reader_(std::move(reader)),
+      ring_(kWaiting, drivers::wheels_with_room()),
+      spare_(drivers::wheels_with_room()) {}
 
 void WheelSource::run() {
   constexpr double kMaintainEvery_s = 1.0;
@@ -51,8 +42,16 @@ void WheelSource::read_all() {
     received_.fetch_add(1, std::memory_order_relaxed);
     const auto utime = static_cast<std::int64_t>(std::llround(1e6 * steady_s())) - age_us;
     wheels_t* slot = ring_.begin_push();
-    if (reader_.take(frame, utime, slot != nullptr ? slot : &spare_) && slot != nullptr) ring_.end_push();
+    wheels_t* message = slot != nullptr ? slot : &spare_;
+    if (!reader_.take(frame, utime, message)) continue;
+    give(*message);
+    if (slot != nullptr) ring_.end_push();
   }
+}
+
+void WheelSource::give(const wheels_t& message) {
+  if (feed_) feed_->add(message);
+  if (Recorder* recorder = recorder_.load(std::memory_order_acquire)) recorder->offer(message);
 }
 
 }  // namespace farpoint::daemon

@@ -5,7 +5,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
+#include "daemon/input/measurement_feed.h"
+#include "daemon/input/recorder.h"
 #include "drivers/can/socketcan.h"
 #include "drivers/can/wheel_reader.h"
 #include "slam/spsc_ring.h"
@@ -18,6 +21,10 @@ class WheelSource {
 
   WheelSource(std::unique_ptr<drivers::SocketCan> bus, drivers::WheelReader reader);
 
+  // Before the thread: gives each measurement to the estimator too.
+  void feed(slam::Estimator* estimator, const slam::WheelConfig& config) { feed_.emplace(estimator, config); }
+  // Any thread: each measurement from now on is recorded too.
+  void record_to(Recorder* recorder) { recorder_.store(recorder, std::memory_order_release); }
   // The thread: reads until stop(). Waits for a frame in poll(), nowhere else.
   void run();
   // Any thread.
@@ -35,11 +42,14 @@ class WheelSource {
 
   void wait_for_frame() const;
   void read_all();
+  void give(const wheels_t& message);
 
   std::unique_ptr<drivers::SocketCan> bus_;
   drivers::WheelReader reader_;
   slam::SpscRing<wheels_t> ring_;
   wheels_t spare_;  // where the ring is full
+  std::optional<MeasurementFeed> feed_;
+  std::atomic<Recorder*> recorder_{nullptr};
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> received_{0};
 };

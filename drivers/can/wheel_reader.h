@@ -11,6 +11,9 @@
 
 namespace farpoint::drivers {
 
+// A message with room for the wheels of any vehicle, so that no measurement uses the heap.
+[[nodiscard]] wheels_t wheels_with_room();
+
 class WheelReader {
  public:
   // Arguments as for read_wheel_signals(). Throws std::runtime_error with what was expected.

@@ -45,16 +45,36 @@ TEST(MeasurementFeed, ASampleHasTheMessagesAxesAndUnits) {
   EXPECT_EQ(sample.accel_m_per_s2, Eigen::Vector3d(0.0, 0.0, 9.81));
 }
 
+TEST(MeasurementFeed, WheelsOfTheRearAxleGiveTheYawRateThatAMessageLacks) {
+  const slam::WheelConfig config{.track_m = 1.6};
+  wheels_t m = wheels(123, 10.0);
+  m.wheel_speed = {9.0, 12.0, 9.84, 10.16};
+  slam::WheelSample sample = make_sample(m, config);
+  EXPECT_NEAR(sample.yaw_rate_rad_per_s, 0.2, 1e-12) << "left turn: the right wheel is the faster one";
+  // Tyres that differ by 3 thousandths, and wheels.yaw_rate_sigma_radps.
+  EXPECT_NEAR(sample.sigma_yaw_rate_rad_per_s, std::hypot(0.003 * 10.0 / 1.6, 0.01), 1e-12);
+  m.wheel_speed = {9.84, 10.16};
+  EXPECT_NEAR(make_sample(m, config).yaw_rate_rad_per_s, 0.2, 1e-12) << "one axle";
+  m.yaw_rate = -0.3;
+  EXPECT_EQ(make_sample(m, config).yaw_rate_rad_per_s, -0.3) << "the message's own counts";
+  m.yaw_rate = kNan;
+  EXPECT_TRUE(std::isinf(make_sample(m, {}).sigma_yaw_rate_rad_per_s)) << "no track is given";
+  m.wheel_speed[0] = kNan;
+  EXPECT_TRUE(std::isinf(make_sample(m, config).sigma_yaw_rate_rad_per_s));
+  m.wheel_speed = {10.0, 10.0, 10.0};
+  EXPECT_TRUE(std::isinf(make_sample(m, config).sigma_yaw_rate_rad_per_s)) << "three wheels are no axle";
+}
+
 TEST(MeasurementFeed, WhatWheelsDoNotKnowWeighsNothing) {
   wheels_t m = wheels(123, 4.0);
-  slam::WheelSample sample = make_sample(m);
+  slam::WheelSample sample = make_sample(m, {});
   EXPECT_EQ(sample.utime, 123);
   EXPECT_EQ(sample.speed_m_per_s, 4.0);
   EXPECT_EQ(sample.sigma_speed_m_per_s, 0.0) << "unknown: the receiver's own";
   EXPECT_EQ(sample.yaw_rate_rad_per_s, 0.0);
   EXPECT_TRUE(std::isinf(sample.sigma_yaw_rate_rad_per_s));
   m.speed = kNan, m.speed_sigma = 0.2, m.yaw_rate = 0.5;
-  sample = make_sample(m);
+  sample = make_sample(m, {});
   EXPECT_EQ(sample.speed_m_per_s, 0.0);
   EXPECT_TRUE(std::isinf(sample.sigma_speed_m_per_s));
   EXPECT_EQ(sample.yaw_rate_rad_per_s, 0.5);
