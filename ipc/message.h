@@ -63,7 +63,7 @@ inline constexpr std::string_view kLayout<schedule_t> = "40 16 12 24";
 template <>
 inline constexpr std::string_view kLayout<simulation_t> = "8 4 sss 8 8 4 4 1";
 template <>
-inline constexpr std::string_view kLayout<status_t> = "8 2 8 1 8 ss 20 48 120 109 16 8 28 8 56 ssss 4 1 8 8";
+inline constexpr std::string_view kLayout<status_t> = "8 2 8 3 8 ss 20 48 120 109 16 8 28 8 56 ssss 4 1 8 8";
 template <>
 inline constexpr std::string_view kLayout<summary_t> =
     "8 2 8 s 128 12 8 4 40 #[0: 4 8 12 24 #[0:4][0:4][0:1] 8 24 #[1:4]] ssss";

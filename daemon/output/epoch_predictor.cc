@@ -8,6 +8,7 @@
 #include "daemon/output/attitude.h"
 #include "daemon/output/extrapolation.h"
 #include "daemon/output/reasons.h"
+#include "daemon/output/sensor_use.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -60,18 +61,6 @@ ipc::CanScaleSource scale_source(const slam::FrameResult& result) {
   }
   return result.metre == slam::MetreSource::kWheels ? ipc::CanScaleSource::kWheels
                                                     : ipc::CanScaleSource::kSecondCamera;
-}
-
-ipc::CanSensorUse wheel_use(const slam::FrameResult& result) {
-  switch (result.wheels) {
-    case slam::WheelTrust::kNone:
-      break;
-    case slam::WheelTrust::kTrusted:
-      return ipc::CanSensorUse::kUsed;
-    case slam::WheelTrust::kContradicted:
-      return ipc::CanSensorUse::kContradicted;
-  }
-  return result.taken.wheels > 0 ? ipc::CanSensorUse::kStarting : ipc::CanSensorUse::kNone;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "daemon/output/rate.h"
 #include "daemon/output/reasons.h"
+#include "daemon/output/sensor_use.h"
 
 namespace farpoint::daemon {
 namespace {
@@ -172,6 +173,8 @@ void FrameReporter::fill_status(const FramePackage& package, const OutputCounts&
   s.utime = r.utime;
   s.state = static_cast<std::int8_t>(r.state);
   s.scale_state = static_cast<std::int8_t>(r.scale);
+  s.metre_source = static_cast<std::int8_t>(r.metre);
+  s.wheels = static_cast<std::int8_t>(wheel_use(r));
   s.quality = static_cast<std::int8_t>(frame_.valid ? r.quality : -1);
   s.map_id = r.map_id;
   s.reset_counter = static_cast<std::int32_t>(r.reset_counter);

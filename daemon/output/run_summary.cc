@@ -35,16 +35,20 @@ const char* outcome(const RunEnd& end) {
   return "done";
 }
 
-const char* scale_text(slam::ScaleState scale) {
-  switch (scale) {
+std::string scale_text(const slam::FrameResult& last) {
+  switch (last.scale) {
     case slam::ScaleState::kUnknown:
       return "unknown";
     case slam::ScaleState::kAssumed:
       return "assumed";
     case slam::ScaleState::kMetric:
-      return "metric";
+      return last.metre == slam::MetreSource::kWheels ? "metric by wheels" : "metric by two cameras";
   }
   return "unknown";
+}
+
+const char* wheels_text(const slam::FrameResult& last) {
+  return last.wheels == slam::WheelTrust::kContradicted ? ", wheels contradict the images" : "";
 }
 
 // What was refused, where anything was.
@@ -96,15 +100,16 @@ std::string last_line(const RunEnd& end, const InputCounts& in, std::int64_t fra
   const std::size_t maps = maps_of(end);
   constexpr double kMegabyte = 1e6;
   return fmt::format(
-      "farpointd: {}: {} frames, {} tracked ({:.1f} %), {}{} map{}, lost {} time{}, scale {}; {:.1f} ms a "
+      "farpointd: {}: {} frames, {} tracked ({:.1f} %), {}{} map{}, lost {} time{}, scale {}{}; {:.1f} ms a "
       "frame (CPU "
       "mean, p99 {:.1f}); peak memory {:.0f} MB{}{}{}{}{}{}",
       outcome(end), end.frames, end.frames_valid, percent(end.frames_valid, end.frames),
       initialised_text(end), maps, maps == 1 ? "" : "s", end.counts.lost, end.counts.lost == 1 ? "" : "s",
-      scale_text(end.last.scale), cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()),
-      quantile(cpu_ms, 0.99), static_cast<double>(peak_resident_bytes()) / kMegabyte, reason_text(end),
-      forgotten_text(end.counts), calibration_text(end), refused_text(in, frames_dropped),
-      written.empty() ? "" : "; wrote ", fmt::join(written, " "));
+      scale_text(end.last), wheels_text(end.last),
+      cpu_ms.empty() ? 0.0 : sum_ms / static_cast<double>(cpu_ms.size()), quantile(cpu_ms, 0.99),
+      static_cast<double>(peak_resident_bytes()) / kMegabyte, reason_text(end), forgotten_text(end.counts),
+      calibration_text(end), refused_text(in, frames_dropped), written.empty() ? "" : "; wrote ",
+      fmt::join(written, " "));
 }
 
 std::FILE* line_stream(const Options& o) {

@@ -91,6 +91,31 @@ TEST_F(UncertaintyTest, TheDriftOfAMotionIsWhatWasExchangedInTheAxesOfItsEnd) {
   EXPECT_TRUE(of_motion.isApprox(0.02 * Matrix6d::Identity(), 1e-6));
 }
 
+TEST_F(UncertaintyTest, AWayByAnotherSensorAddsItsCovarianceToTheDriftAtOnce) {
+  const Matrix6d of_way = 0.05 * Matrix6d::Identity();
+  uncertainty.carry(step(39, 1).T_odom_body, step(39, 1).utime, of_way);
+  EXPECT_TRUE(drift().array().isNaN().all()) << "no pose has begun it";
+  uncertainty.advance(step(40, 1), errors(0.01, 0.0));
+  const Matrix6d a = drift();
+  uncertainty.carry(step(41, 1).T_odom_body, step(41, 1).utime, of_way);
+  const Matrix6d of_motion = carried(step(41, 1).T_odom_body.inverse(), drift() - a);
+  EXPECT_TRUE(of_motion.isApprox(of_way, 1e-6));
+  EXPECT_TRUE(uncertainty.errors().drift_of_second.isApprox(drift() - a, 1e-6));
+}
+
+TEST_F(UncertaintyTest, TheScalesSigmaIsThatOfWhatGaveTheMetre) {
+  OdometryStep s = step(0, 1);
+  s.metric = true;
+  uncertainty.advance(s, errors(0.01, 0.0));
+  EXPECT_LT(uncertainty.errors().scale_sigma, 0.01) << "the pair's";
+  s.unit_sigma = 0.03;
+  uncertainty.advance(s, errors(0.01, 0.0));
+  EXPECT_EQ(uncertainty.errors().scale_sigma, 0.03) << "the wheels'";
+  s.metric = false;
+  uncertainty.advance(s, errors(0.01, 0.0));
+  EXPECT_TRUE(std::isinf(uncertainty.errors().scale_sigma));
+}
+
 TEST_F(UncertaintyTest, DriftNeverFalls) {
   uncertainty.advance(step(0, 1), errors(0.01, 0.0));
   Matrix6d before = drift();

@@ -86,6 +86,22 @@ TEST(EstimatorWithWheels, OneCameraIsMetricWithinTwoSecondsOfValidPosesAndResets
   EXPECT_NEAR(r.velocity_body.x(), 10.0, 1.5);
 }
 
+// A receiver takes differences of drift between messages of one reset counter.
+TEST(EstimatorWithWheels, TheDriftBeginsAnewWithTheMetreAndSigmasAreThoseOfTheWheels) {
+  WheeledDrive d;
+  FrameResult r = d.step({});
+  for (int i = 0; i < 100 && r.scale != ScaleState::kMetric; ++i) r = d.step({});
+  ASSERT_EQ(r.scale, ScaleState::kMetric);
+  EXPECT_EQ(r.metre, MetreSource::kWheels);
+  EXPECT_EQ(r.wheels, WheelTrust::kTrusted);
+  const SE3 T_body_odom = r.T_odom_body.inverse();
+  EXPECT_TRUE(carried(T_body_odom, r.odometry.drift).isApprox(r.odometry.noise, 1e-6));
+  EXPECT_GE(r.odometry.scale_sigma, WheelConfig{}.scale_sigma);
+  EXPECT_LE(r.odometry.scale_sigma, 0.05);
+  const double speed_sigma = std::sqrt(r.velocity_covariance(0, 0));
+  EXPECT_GE(speed_sigma, r.odometry.scale_sigma * r.velocity_body.x()) << "the unit's error is the speed's";
+}
+
 TEST(EstimatorWithWheels, WithoutThemTheScaleStaysUnknown) {
   WheelConfig off;
   off.use = false;
@@ -131,6 +147,7 @@ TEST(EstimatorWithWheels, BlindItGoesOnByWheelsForALimitedTimeAndWithoutAStepAft
   WheeledDrive d(config);
   FrameResult r = d.drive(80);
   const SE3 odom_from = r.T_odom_body, from = d.truth();
+  const Matrix6d drift_from = r.odometry.drift;
   for (int i = 0; i < 8; ++i) {
     r = d.step({.blind = true, .wheel_factor = 1.05});
     EXPECT_EQ(r.state, State::kDegraded);
@@ -141,6 +158,11 @@ TEST(EstimatorWithWheels, BlindItGoesOnByWheelsForALimitedTimeAndWithoutAStepAft
     EXPECT_GT(r.covariance(0, 0), 0.0);
   }
   EXPECT_NEAR(way(odom_from, r.T_odom_body), 1.05 * way(from, d.truth()), 0.02 * way(from, d.truth()));
+  const double blind_m = way(odom_from, r.T_odom_body);
+  const Matrix6d grown = carried(r.T_odom_body.inverse(), r.odometry.drift - drift_from);
+  EXPECT_NEAR(std::sqrt(grown(0, 0)), config.scale_sigma * blind_m + config.speed_sigma_mps * 0.8, 0.1);
+  EXPECT_NEAR(std::sqrt(r.velocity_covariance(0, 0)),
+              config.speed_sigma_mps + (config.scale_sigma + config.slip_sigma) * r.velocity_body.x(), 0.02);
   SE3 odom_last = r.T_odom_body, last = d.truth();
   for (int i = 0; i < 12; ++i) {
     r = d.step({});

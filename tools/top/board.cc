@@ -84,9 +84,23 @@ std::string spread(std::vector<double> values) {
   return fmt::format("p50 {:.1f}  p99 {:.1f}  max {:.1f} ms", at(0.5), at(0.99), values.back());
 }
 
-const char* scale_text(int scale) {
-  if (scale == status_t::SCALE_METRIC) return "metric";
-  return scale == status_t::SCALE_ASSUMED ? "assumed" : "unknown";
+std::string scale_text(const status_t& s) {
+  if (s.scale_state == status_t::SCALE_ASSUMED) return "assumed";
+  if (s.scale_state != status_t::SCALE_METRIC) return "unknown";
+  return s.metre_source == status_t::METRE_WHEELS ? "metric, by wheels" : "metric, by two cameras";
+}
+
+const char* wheels_text(int wheels) {
+  switch (wheels) {
+    case status_t::WHEELS_STARTING:
+      return "   wheels not judged yet";
+    case status_t::WHEELS_USED:
+      return "   wheels used";
+    case status_t::WHEELS_CONTRADICTED:
+      return "   wheels contradict the images";
+    default:
+      return "";
+  }
 }
 
 }  // namespace
@@ -154,8 +168,8 @@ std::string Board::state_lines(double now_s, bool colour) const {
     line = painted(fmt::format("SILENT for {:.0f} s", now_s - status_s_), kRed, colour) + ", last " + name;
   }
   line += s.quality >= 0 ? fmt::format("   quality {}", s.quality) : "   quality -";
-  line += fmt::format("   scale {}   map {}   resets {}   lost {} times\n", scale_text(s.scale_state),
-                      s.map_id, s.reset_counter, s.times_lost);
+  line += fmt::format("   scale {}{}   map {}   resets {}   lost {} times\n", scale_text(s),
+                      wheels_text(s.wheels), s.map_id, s.reset_counter, s.times_lost);
   const std::string why = reason(now_s);
   if (!why.empty()) line += "reason    " + why.substr(0, 88) + "\n";
   return line + "valid     " + last_valid_text(now_s) + "\n\n";
