@@ -90,6 +90,28 @@ TEST(Top, PairsAreShownWhereThereIsASecondCamera) {
       has(board.render(100.5, false), "stereo    0 pairs   34 left alone   0 right alone   skew -1.2 ms\n"));
 }
 
+TEST(Top, TheMetresSourceAndTheWheelsAreShown) {
+  Board board;
+  status_t s = status_of(status_t::STATE_TRACKING);
+  board.take(s, 100.0);
+  EXPECT_TRUE(has(board.render(100.1, false), "scale unknown   map"));
+  EXPECT_FALSE(has(board.render(100.1, false), "wheels"));
+  s.wheels = status_t::WHEELS_STARTING;
+  board.take(s, 100.2);
+  EXPECT_TRUE(has(board.render(100.3, false), "wheels    not judged yet\n"));
+  s.wheels = status_t::WHEELS_USED;
+  s.scale_state = status_t::SCALE_METRIC;
+  s.metre_source = status_t::METRE_WHEELS;
+  board.take(s, 100.4);
+  EXPECT_TRUE(has(board.render(100.5, false), "scale metric by wheels   map"));
+  EXPECT_TRUE(has(board.render(100.5, false), "wheels    used\n"));
+  s.wheels = status_t::WHEELS_CONTRADICTED;
+  s.metre_source = status_t::METRE_CAMERAS;
+  board.take(s, 100.6);
+  EXPECT_TRUE(has(board.render(100.7, false), "scale metric by two cameras   map"));
+  EXPECT_TRUE(has(board.render(100.7, false), "wheels    contradict the images, not used\n"));
+}
+
 TEST(Top, MavlinkIsShownWhereItRuns) {
   Board board;
   status_t s = status_of(status_t::STATE_TRACKING);

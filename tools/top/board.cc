@@ -87,17 +87,17 @@ std::string spread(std::vector<double> values) {
 std::string scale_text(const status_t& s) {
   if (s.scale_state == status_t::SCALE_ASSUMED) return "assumed";
   if (s.scale_state != status_t::SCALE_METRIC) return "unknown";
-  return s.metre_source == status_t::METRE_WHEELS ? "metric, by wheels" : "metric, by two cameras";
+  return s.metre_source == status_t::METRE_WHEELS ? "metric by wheels" : "metric by two cameras";
 }
 
 const char* wheels_text(int wheels) {
   switch (wheels) {
     case status_t::WHEELS_STARTING:
-      return "   wheels not judged yet";
+      return "wheels    not judged yet\n";
     case status_t::WHEELS_USED:
-      return "   wheels used";
+      return "wheels    used\n";
     case status_t::WHEELS_CONTRADICTED:
-      return "   wheels contradict the images";
+      return "wheels    contradict the images, not used\n";
     default:
       return "";
   }
@@ -168,8 +168,8 @@ std::string Board::state_lines(double now_s, bool colour) const {
     line = painted(fmt::format("SILENT for {:.0f} s", now_s - status_s_), kRed, colour) + ", last " + name;
   }
   line += s.quality >= 0 ? fmt::format("   quality {}", s.quality) : "   quality -";
-  line += fmt::format("   scale {}{}   map {}   resets {}   lost {} times\n", scale_text(s),
-                      wheels_text(s.wheels), s.map_id, s.reset_counter, s.times_lost);
+  line += fmt::format("   scale {}   map {}   resets {}   lost {} times\n", scale_text(s), s.map_id,
+                      s.reset_counter, s.times_lost);
   const std::string why = reason(now_s);
   if (!why.empty()) line += "reason    " + why.substr(0, 88) + "\n";
   return line + "valid     " + last_valid_text(now_s) + "\n\n";
@@ -271,6 +271,7 @@ std::string Board::count_lines() const {
         fmt::format("stereo    {} pairs   {} left alone   {} right alone   skew {:.1f} ms\n", s.stereo_pairs,
                     s.stereo_left_alone, s.stereo_right_alone, 1e-3 * static_cast<double>(s.stereo_skew_us));
   }
+  text += wheels_text(s.wheels);
   text += fmt::format("frames    {} tracked   {} valid   {} late   {} keyframes not made\n", s.frames_tracked,
                       s.frames_valid, s.deadlines_missed, s.keyframes_dropped);
   const MapCounts map = map_counts(s);
