@@ -85,7 +85,7 @@ int replay_in_order(const Options& options, const Config& config, Schedule* sche
   while (StopOnSignal::signal() == 0 && source.next(&frame, &clock)) {
     if (!session) {
       session = session_of(config, source, &outputs, schedule ? "recorded" : "lockstep", schedule != nullptr);
-      source.feed_to(&feed.emplace(&session->estimator()));
+      source.feed_to(&feed.emplace(&session->estimator(), config.estimator.wheels));
     }
     const RecordedChance* recorded = nullptr;
     if (schedule != nullptr && (recorded = schedule->take(frame.meta.utime)) == nullptr) {

@@ -434,6 +434,7 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome ou
     state_ = outcome.inliers < config_.tracking.degraded_inliers ? State::kDegraded : State::kTracking;
   rejoin_map(*frame, outcome.T_world_body);
   fill_pose(outcome.T_world_body, outcome.covariance);
+  if (still) result_.velocity_body.setZero();
   note_errors();
   if (is_valid(state_)) valid_utime_ = frame->utime;
   result_.quality = is_valid(state_) ? quality_of(outcome) : -1;
