@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slam/tracking/velocity_filter.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace farpoint::slam {
@@ -13,12 +12,6 @@ namespace {
 constexpr double kJerk_m2_per_s5 = 5.0, kAngularJerk_rad2_per_s5 = 0.5;
 // Before the first motions: 1 sigma.
 constexpr double kAcceleration_m_per_s2 = 4.0, kAngularAcceleration_rad_per_s2 = 1.0;
-
-// The jerk's density follows surprises, squares of a prediction's error over its variance, whose mean is 1:
-// by a factor of e in a second of none. One surprise counts as nine at most, that of three sigmas.
-constexpr double kLearn_per_s = 1.0, kMostSurprise = 9.0;
-// Densities between those of a vehicle at rest and of a collision.
-constexpr double kLeastJerk = 1e-3, kMostJerk = 10.0;
 
 constexpr std::size_t kTranslations = 3;
 
@@ -60,7 +53,6 @@ void VelocityFilter::begin(const Vector6d& moved, double dt_s, const Vector6d& n
     const double acceleration =
         i < kTranslations ? kAcceleration_m_per_s2 * metre : kAngularAcceleration_rad_per_s2;
     const double change = 0.5 * acceleration * dt_s;
-    axes_[i].jerk = 1.0;
     axes_[i].x = {0.0, moved[axis] / dt_s, 0.0};
     axes_[i].P = Eigen::Vector3d(noise[axis], 2.0 * noise[axis] / (dt_s * dt_s) + change * change,
                                  acceleration * acceleration)
@@ -85,20 +77,13 @@ void VelocityFilter::advance(const SE3& T_before_now, double dt_s, const Vector6
     const double density = i < kTranslations ? kJerk_m2_per_s5 * metre * metre : kAngularJerk_rad2_per_s5;
     Axis& a = axes_[i];
     a.x = F * a.x;
-    a.P = F * a.P * F.transpose() + a.jerk * density * Q;
-    const double innovation = moved[axis] - a.x[0], variance = a.P(0, 0) + noise[axis];
-    learn_jerk(innovation * innovation / variance, dt_s, &a);
-    const Eigen::Vector3d gain = a.P.col(0) / variance;
-    a.x += gain * innovation;
+    a.P = F * a.P * F.transpose() + density * Q;
+    const Eigen::Vector3d gain = a.P.col(0) / (a.P(0, 0) + noise[axis]);
+    a.x += gain * (moved[axis] - a.x[0]);
     const Eigen::Matrix3d P = a.P - gain * a.P.row(0);
     a.P = 0.5 * (P + P.transpose());
     a.x[0] -= moved[axis];  // against the newest pose as measured
   }
-}
-
-void VelocityFilter::learn_jerk(double surprise, double dt_s, Axis* axis) {
-  const double growth = kLearn_per_s * dt_s * (std::min(surprise, kMostSurprise) - 1.0);
-  axis->jerk = std::clamp(axis->jerk * std::exp(growth), kLeastJerk, kMostJerk);
 }
 
 void VelocityFilter::change_unit(double factor) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The body's velocity at the newest frame, from the motions between frames: a Kalman filter whose
-// acceleration changes by white jerk. No difference of two poses, which is half a period late. How much the
-// jerk is, each axis learns from how far motions come out from their predictions: a car's lateral axis is
-// calmer than its longitudinal one, and a drone's are not.
+// acceleration changes by white jerk. No difference of two poses, which is half a period late.
 #pragma once
 
 #include <array>
@@ -37,10 +35,8 @@ class VelocityFilter {
   struct Axis {
     Eigen::Vector3d x = Eigen::Vector3d::Zero();
     Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
-    double jerk = 1.0;  // density, in that of a car's longitudinal axis
   };
   void begin(const Vector6d& moved, double dt_s, const Vector6d& noise, double metre);
-  static void learn_jerk(double surprise, double dt_s, Axis* axis);
 
   std::array<Axis, 6> axes_;
   bool begun_ = false;
