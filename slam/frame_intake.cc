@@ -83,13 +83,12 @@ struct FrameIntake::PyramidBuffer final : FrameImage {
                                 const Eigen::Vector2f& predicted_px, float max_shift_px) const override {
     return image.align(host, A, predicted_px, max_shift_px);
   }
-  std::shared_ptr<const ImageMask> mask;
-
   [[nodiscard]] bool correlate(const Patch& host, const Eigen::Matrix2f& A,
                                std::span<const Eigen::Vector2f> pixels,
                                std::span<float> zncc) const override {
     return image.correlate(host, A, pixels, zncc);
   }
+  std::shared_ptr<const ImageMask> mask;
   Pyramid pyramid;
   PyramidImage image;
 };

@@ -81,8 +81,8 @@ class FrameImage {
   [[nodiscard]] virtual Alignment align(const Patch& host, const Eigen::Matrix2f& A_target_host,
                                         const Eigen::Vector2f& predicted_px, float max_shift_px) const = 0;
   // Zero-mean normalised cross correlation of the warped `host` with this image at each of `pixels` (level
-  // 0), to the nearest pixel of the level that align() reads; -1 where the image ends. A search, not a
-  // measurement. False where the patch cannot be warped, or this image cannot be searched.
+  // 0), to the nearest pixel of the level that align() reads; -1 where the image ends or is masked. A search,
+  // not a measurement. False where the patch cannot be warped, or this image cannot be searched.
   [[nodiscard]] virtual bool correlate(const Patch& /*host*/, const Eigen::Matrix2f& /*A_target_host*/,
                                        std::span<const Eigen::Vector2f> /*pixels*/,
                                        std::span<float> /*zncc*/) const {

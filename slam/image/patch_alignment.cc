@@ -213,6 +213,9 @@ bool read_patch(const Pyramid& pyramid, const Patch& patch, const Eigen::Matrix2
   return area < kMaxScale * kMaxScale && area * kMaxScale * kMaxScale > 1;
 }
 
+// Pixels to either side of its centre that a coarse window reads: half its side, less half a pixel.
+constexpr double kCoarseSupport = (kSide - 1) / 2.0;
+
 // A template in whole numbers, for sums without rounding.
 struct CoarseTemplate {
   alignas(16) std::int16_t value[kCount];
@@ -329,14 +332,21 @@ bool PyramidImage::correlate(const Patch& host, const Eigen::Matrix2f& A_target_
   const CoarseTemplate coarse(host_template);
   const ImageView image = pyramid_->level(reading.level);
   const float scale = pyramid_->scale(reading.level);
+  const double support_px = pyramid_->support_px(reading.level, kCoarseSupport);
+  const auto is_masked = [&](int x0, int y0) {
+    const Eigen::Vector2f centre(static_cast<float>(x0) - kFirst, static_cast<float>(y0) - kFirst);
+    const Eigen::Vector2f half(0.5F, 0.5F);
+    return mask_ != nullptr && mask_->touches(((centre + half) * scale - half).cast<double>(), support_px);
+  };
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     // The template's first pixel lies kFirst, half a pixel and three, before the corner.
     const int x0 = nearest_pixel((pixels[i].x() + 0.5F) / scale - 0.5F + kFirst);
     const int y0 = nearest_pixel((pixels[i].y() + 0.5F) / scale - 0.5F + kFirst);
     const bool inside = x0 >= 0 && y0 >= 0 && x0 + kSide <= image.width_px && y0 + kSide <= image.height_px;
-    zncc[i] = inside ? correlation(image.data + static_cast<std::ptrdiff_t>(y0) * image.stride_bytes + x0,
-                                   image.stride_bytes, coarse)
-                     : -1.0F;
+    zncc[i] = inside && !is_masked(x0, y0)
+                  ? correlation(image.data + static_cast<std::ptrdiff_t>(y0) * image.stride_bytes + x0,
+                                image.stride_bytes, coarse)
+                  : -1.0F;
   }
   return true;
 }

@@ -187,37 +187,63 @@ class Fence {
   double period_px_;
 };
 
-TEST(CurveSearch, RefusesAPatchThatTwoPlacesLookLike) {
-  const Fence fence(24);
-  const OwnedImage host_image = fence.image(0, 1), target_image = fence.image(30, 2);
-  Pyramid host(480, 120, {}), target(480, 120, {});
-  host.build(host_image.view());
-  target.build(target_image.view());
-  const Camera camera = [] {
+// Two rectified cameras before a fence, and a place of it that the first shows at (300, 60), the second at
+// (270, 60) and, to the eye, every 24 pixels.
+class BesideAFence {
+ public:
+  BesideAFence() : host_(480, 120, {}), target_(480, 120, {}) {
+    const Fence fence(24);
+    host_.build(fence.image(0, 1).view());
+    target_.build(fence.image(30, 2).view());
+    FeatureSet set;
+    set.features.push_back({.u_px = 300, .v_px = 60});
+    set.descriptors.emplace_back();
+    EXPECT_TRUE(PyramidImage(&host_).extract_patch(set, 0, &patch_));
+    query_.patch = &patch_;
+    EXPECT_TRUE(camera_.unproject({300, 60}, &query_.bearing, &query_.d_bearing_d_pixel));
+  }
+  [[nodiscard]] CurveMatch find(double min_inverse_depth, double max_inverse_depth,
+                                const ImageMask* mask = nullptr) const {
+    CurveQuery query = query_;
+    query.min_inverse_depth = min_inverse_depth;
+    query.max_inverse_depth = max_inverse_depth;
+    const PyramidImage image(&target_, mask);
+    return CurveSearch(camera_, SE3{Eigen::Quaterniond::Identity(), {-0.4, 0, 0}}, image).find(query);
+  }
+
+ private:
+  const Camera camera_{[] {
     Camera::Parameters p;
     p.width_px = 480, p.height_px = 120;
     p.fx_px = p.fy_px = 400, p.cx_px = 240, p.cy_px = 60;
-    return Camera(p);
-  }();
-  const SE3 T_target_host{Eigen::Quaterniond::Identity(), {-0.4, 0, 0}};
-  FeatureSet set;
-  set.features.push_back({.u_px = 300, .v_px = 60});
-  set.descriptors.emplace_back();
-  Patch patch;
-  ASSERT_TRUE(PyramidImage(&host).extract_patch(set, 0, &patch));
-  CurveQuery query;
-  query.patch = &patch;
-  ASSERT_TRUE(camera.unproject({300, 60}, &query.bearing, &query.d_bearing_d_pixel));
-  const PyramidImage image(&target);
-  const CurveSearch search(camera, T_target_host, image);
-  query.max_inverse_depth = 0.9;
-  EXPECT_FALSE(search.find(query).ok);
+    return p;
+  }()};
+  Pyramid host_, target_;
+  Patch patch_;
+  CurveQuery query_;
+};
+
+TEST(CurveSearch, RefusesAPatchThatTwoPlacesLookLike) {
+  const BesideAFence beside;
+  EXPECT_FALSE(beside.find(0.0, 0.9).ok);
   // One post alone within reach: disparity 30 of 160 is at 0.1875.
-  query.min_inverse_depth = 0.17;
-  query.max_inverse_depth = 0.20;
-  const CurveMatch match = search.find(query);
+  const CurveMatch match = beside.find(0.17, 0.20);
   ASSERT_TRUE(match.ok);
   EXPECT_NEAR(match.pixel.x(), 270.0F, 0.15F);
+}
+
+// Any one of the places that look alike, where a mask leaves it alone.
+TEST(CurveSearch, PlacesUnderTheMaskAreNoRivals) {
+  const BesideAFence beside;
+  for (int place = 174; place <= 294; place += 24) {
+    OwnedImage around_place(480, 120, 0);
+    for (int y = 0; y < 120; ++y)
+      for (int x = place - 12; x <= place + 12; ++x) around_place.at(x, y) = 255;
+    const ImageMask mask(480, 120, around_place.pixels);
+    const CurveMatch match = beside.find(0.0, 0.9, &mask);
+    ASSERT_TRUE(match.ok) << place;
+    EXPECT_NEAR(match.pixel.x(), static_cast<float>(place), 0.5F);
+  }
 }
 
 TEST(CurveSearch, FindsNothingWhereTheOtherImageShowsSomethingElse) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "slam/image/extractor.h"
@@ -148,6 +149,50 @@ TEST(Mask, PatchesAndAlignmentsDoNotDependOnMaskedPixels) {
   }
   EXPECT_GT(aligned, 3000);
   EXPECT_GT(refused, 1000);
+}
+
+// Like the alignment above, for the coarse search: patches of the image are looked for around their own
+// place.
+TEST(Mask, CorrelationsDoNotDependOnMaskedPixels) {
+  const ImageMask mask = mask_of(mask_pixels());
+  const OwnedImage image = testing::rectangles(kWidth, kHeight, 900, 8);
+  const Built first(image, &mask), second(with_other_content(image, 9), &mask), unmasked(image);
+  std::array<int, 8> compared{}, refused{};
+  for (std::size_t level = 0; level < 8; ++level)
+    for (float v = 20; v < kHeight; v += 7)
+      for (float u = 20; u < kWidth; u += 7) {
+        FeatureSet set;
+        set.features.push_back({.u_px = u, .v_px = v, .level = static_cast<std::uint8_t>(level)});
+        set.descriptors.emplace_back();
+        Patch patch;
+        if (!unmasked.frame.extract_patch(set, 0, &patch)) continue;
+        std::array<Eigen::Vector2f, 9> places;
+        for (std::size_t i = 0; i < places.size(); ++i)
+          places[i] = {u + 3.3F * (static_cast<float>(i) - 4.0F), v + 0.4F * static_cast<float>(i)};
+        std::array<float, 9> a, b, without;
+        const Eigen::Matrix2f same_size = Eigen::Matrix2f::Identity();
+        if (!unmasked.frame.correlate(patch, same_size, places, without)) continue;
+        ASSERT_TRUE(first.frame.correlate(patch, same_size, places, a));
+        ASSERT_TRUE(second.frame.correlate(patch, same_size, places, b));
+        ASSERT_EQ(a, b) << level << " at " << u << ", " << v;
+        for (std::size_t i = 0; i < places.size(); ++i) {
+          // Masked or not, nothing between.
+          ASSERT_TRUE(a[i] == without[i] || a[i] == -1.0F);
+          if (mask.touches(places[i].cast<double>(), 0)) {
+            ASSERT_EQ(a[i], -1.0F);
+          }
+          // The eight pixels of the window, as far as rounding may move it.
+          const double reach_px = first.pyramid.support_px(static_cast<int>(level), 4.0);
+          if (!mask.touches(places[i].cast<double>(), reach_px)) {
+            ASSERT_EQ(a[i], without[i]);
+          }
+          ++(a[i] == without[i] ? compared : refused)[level];
+        }
+      }
+  for (std::size_t level = 0; level < 8; ++level) {
+    EXPECT_GT(compared[level], 1000) << level;
+    EXPECT_GT(refused[level], 1000) << level;
+  }
 }
 
 }  // namespace

@@ -60,8 +60,11 @@ Scale scale_around(const Axis& axis, const std::vector<double>& values, bool fro
     low /= narrow ? 2.0 : kMargin;
     high *= narrow ? 2.0 : kMargin;
   } else {
-    const double margin = narrow ? 0.5 : 0.04 * (high - low);
-    low = from_zero && low >= 0.0 && low < 0.3 * high ? 0.0 : low - margin;
+    const bool is_from_zero = from_zero && low >= 0.0 && low < 0.3 * high;
+    if (is_from_zero) low = 0.0;
+    // Of the whole axis, so that lines far above zero do not lie on the frame.
+    const double margin = narrow ? 0.5 : 0.04 * std::max(high - axis.low.value_or(low), 0.0);
+    if (!is_from_zero) low -= margin;
     high += margin;
   }
   return {axis.low.value_or(low), axis.high.value_or(high), axis.is_log};

@@ -12,6 +12,8 @@ namespace farpoint::tools::report {
 namespace {
 
 constexpr double kLeft_px = 62, kRight_px = 14, kTop_px = 30, kBottom_px = 44, kLegendRow_px = 17;
+// Of a pixel: the script shows values to a hundredth of one, and zooms in 60 times.
+constexpr int kDigits = 2;
 constexpr double kLetter_px = 7.0, kLegendLine_px = 36;
 // More points than this a line cannot show.
 constexpr std::size_t kMostPoints = 1500;
@@ -156,9 +158,13 @@ bool Plot::shows_something(const Scales& scales) const {
 }
 
 std::vector<const Plot::Layer*> Plot::named_layers() const {
+  const auto is_drawn = [](const Layer& layer) {
+    return std::any_of(layer.points.begin(), layer.points.end(),
+                       [](const Eigen::Vector2d& p) { return std::isfinite(p.x()) || std::isfinite(p.y()); });
+  };
   std::vector<const Layer*> named;
   for (const Layer& layer : layers_) {
-    if (!layer.name.empty() && layer.kind != Kind::kLabel) named.push_back(&layer);
+    if (!layer.name.empty() && layer.kind != Kind::kLabel && is_drawn(layer)) named.push_back(&layer);
   }
   return named;
 }
@@ -235,20 +241,30 @@ void Plot::draw_line(const Layer& layer, const Scales& scales, Svg* svg) const {
       piece.push_back(place(scales, p));
       continue;
     }
-    svg->polyline(piece, attributes);
+    svg->polyline(piece, attributes, kDigits);
     piece.clear();
   }
-  svg->polyline(piece, attributes);
+  svg->polyline(piece, attributes, kDigits);
 }
 
 // Neighbouring pieces of one level are one element.
 void Plot::draw_coloured(const Layer& layer, const Scales& scales, Svg* svg) const {
   std::vector<Eigen::Vector2d> piece;
+  std::string values;
   int level = 0;
+  const auto add = [&](const Eigen::Vector2d& at, double value) {
+    piece.push_back(at);
+    if (!values.empty()) values += ' ';
+    values += number(value, 4);
+  };
   const auto finish = [&] {
     svg->polyline(piece,
-                  stroke({level_colour(level), "", layer.style.width_px}) + " stroke-linecap=\"round\"");
+                  stroke({level_colour(level), "", layer.style.width_px}) +
+                      " stroke-linecap=\"round\" data-name=\"" + escaped(layer.colours.label) +
+                      "\" data-values=\"" + values + "\"",
+                  kDigits);
     piece.clear();
+    values.clear();
   };
   for (std::size_t i = 0; i < std::min(layer.points.size(), layer.colours.values.size()); ++i) {
     if (!layer.points[i].allFinite()) {
@@ -256,11 +272,12 @@ void Plot::draw_coloured(const Layer& layer, const Scales& scales, Svg* svg) con
       continue;
     }
     const Eigen::Vector2d at = place(scales, layer.points[i]);
-    piece.push_back(at);
-    const int next = colour_level(layer.colours.values[i], layer.colours.low, layer.colours.high);
+    const double value = layer.colours.values[i];
+    add(at, value);
+    const int next = colour_level(value, layer.colours.low, layer.colours.high);
     if (next == level) continue;
     finish();
-    piece.push_back(at);
+    add(at, value);
     level = next;
   }
   finish();
@@ -284,10 +301,12 @@ void Plot::draw_layer(const Layer& layer, const Scales& scales, Svg* svg) const 
     case Kind::kLabel: {
       if (!layer.points[0].allFinite()) return;
       const Eigen::Vector2d at = place(scales, layer.points[0]);
+      svg->begin_group("class=\"label\" data-at=\"" + number(at.x()) + "," + number(at.y()) + "\"");
       svg->circle(at, 5.0, "fill=\"#fff\" " + stroke(layer.style));
       const bool is_right = at.x() + kLetter_px * static_cast<double>(layer.name.size()) + 12.0 > end.x();
-      return svg->text(at + Eigen::Vector2d(is_right ? -9 : 9, at.y() < corner.y() + 20.0 ? 16 : -6),
-                       layer.name, is_right ? Anchor::kEnd : Anchor::kStart, "class=\"mark\"");
+      svg->text(at + Eigen::Vector2d(is_right ? -9 : 9, at.y() < corner.y() + 20.0 ? 16 : -6), layer.name,
+                is_right ? Anchor::kEnd : Anchor::kStart, "class=\"mark\"");
+      return svg->end_group();
     }
     case Kind::kDots: {
       std::vector<Eigen::Vector2d> points;

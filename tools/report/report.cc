@@ -5,6 +5,7 @@
 #include "tools/report/html.h"
 #include "tools/report/sections.h"
 #include "tools/report/svg.h"
+#include "tools/report/upright.h"
 #include "tools/report/work_figures.h"
 
 namespace farpoint::tools::report {
@@ -20,7 +21,8 @@ std::string truth_text(const ReportRequest& request, const Truth& truth) {
 }  // namespace
 
 Report make_report(const ReportRequest& request) {
-  const Truth truth = request.truth.empty() ? Truth{} : read_reference(request.truth, true);
+  Truth truth = request.truth.empty() ? Truth{} : read_reference(request.truth, true);
+  const std::string turned = turn_upright(&truth);
   const Truth* known = truth.is_known() ? &truth : nullptr;
   Runs runs;
   std::string names;
@@ -28,7 +30,7 @@ Report make_report(const ReportRequest& request) {
     runs.push_back(read_run_record(file, known));
     names += (names.empty() ? "" : ", ") + runs.back().name;
   }
-  std::string body = "<p>" + truth_text(request, truth) + "</p>\n";
+  std::string body = "<p>" + truth_text(request, truth) + (turned.empty() ? "" : " " + turned) + "</p>\n";
   body += overview_section(runs) + trajectory_section(runs, known) + error_section(runs, known) +
           motion_section(runs, known) + landmark_section(runs) + vmp_section(runs) + map_section(runs) +
           track_section(runs, request.truth) + timing_section(runs) + workload_section(runs) +

@@ -7,13 +7,18 @@ const char* page_script() {
   return R"JS(
 "use strict";
 (() => {
-const far_px = 24;                       // a line further from the pointer has no value there
+const far_px = 10;                       // a line further from the pointer has no value there
 
 // ---- numbers and axes
-const text = v => {
+// finest: what the drawing can tell apart; digits beyond it are left out.
+const text = (v, finest = 0) => {
+  if (finest > 0) {
+    const unit = Math.pow(10, Math.ceil(Math.log10(finest) - 1e-9));
+    v = 1 > unit ? Math.round(v / unit) * unit : Math.round(v);
+  }
   const size = Math.abs(v);
-  if (size === 0) return "0";
-  return size >= 1e6 || 1e-4 > size ? v.toExponential(2) : String(Number(v.toPrecision(5)));
+  if (1e-300 > size) return "0";
+  return size >= 1e7 || 1e-4 > size ? v.toExponential(2) : String(Number(v.toPrecision(6)));
 };
 const steps = (low, high, wanted) => {
   const raw = (high - low) / wanted, power = Math.pow(10, Math.floor(Math.log10(raw)));
@@ -43,7 +48,14 @@ const axisOf = (words, from, to) => {
       const share = (px - from) / (to - from);
       return isLog ? low * Math.pow(high / low, share) : low + share * (high - low);
     },
-    pixel: v => from + at(v) * (to - from)
+    pixel: v => from + at(v) * (to - from),
+    // The value at a point of the drawing, which has hundredths of a pixel; at the end where that is passed.
+    words(px) {
+      const first = Math.min(from, to), last = Math.max(from, to), bound = Math.min(Math.max(px, first), last);
+      const finest = Math.abs(this.value(bound + 0.005) - this.value(bound - 0.005));
+      const outside = bound === px ? "" : (px - bound) * (to - from) > 0 ? "over " : "under ";
+      return outside + text(this.value(bound), finest);
+    }
   };
 };
 
@@ -63,6 +75,12 @@ const chartOf = svg => {
     for (const key of Object.keys(attributes)) element.setAttribute(key, attributes[key]);
     return parent.appendChild(element);
   };
+  // Else the browser shows the title over the values.
+  const title = svg.querySelector("title");
+  if (title) {
+    svg.setAttribute("aria-label", title.textContent);
+    title.remove();
+  }
   const cursor = make(area, "line", {class: "cursor", visibility: "hidden"});
   const frame = make(area, "rect", {class: "chosen", visibility: "hidden"});
   const lines = [];
@@ -71,16 +89,22 @@ const chartOf = svg => {
     if (!name) continue;
     let line = lines.find(known => known.name === name);
     if (!line) lines.push(line = {name, points: []});
-    for (const pair of polyline.getAttribute("points").trim().split(" "))
-      line.points.push(pair.split(",").map(Number));
+    const values = (polyline.getAttribute("data-values") || "").split(" ");
+    for (const [i, pair] of polyline.getAttribute("points").trim().split(" ").entries())
+      line.points.push([...pair.split(",").map(Number), values[i]]);
   }
+  const labels = [...area.querySelectorAll("g.label")].map(element => {
+    const [u, v] = element.getAttribute("data-at").split(",").map(Number);
+    return {element, u, v};
+  });
 
-  // Pixels of the unzoomed diagram under the pointer.
+  // Pixels of the unzoomed diagram under the pointer; of one outside the nearest inside.
   const pointOf = event => {
     const seen = svg.getBoundingClientRect(), width = Number(svg.getAttribute("width"));
     const u = (event.clientX - seen.left) * width / seen.width, v = (event.clientY - seen.top) * width / seen.width;
-    const inside = u >= box.x && box.x + box.w >= u && v >= box.y && box.y + box.h >= v;
-    return {inside, x: view.x + (u - box.x) * view.w / box.w, y: view.y + (v - box.y) * view.h / box.h};
+    const p = Math.min(Math.max(u, box.x), box.x + box.w), q = Math.min(Math.max(v, box.y), box.y + box.h);
+    return {inside: p === u && q === v,
+            x: view.x + (p - box.x) * view.w / box.w, y: view.y + (q - box.y) * view.h / box.h};
   };
 
   const drawTicks = () => {
@@ -98,14 +122,20 @@ const chartOf = svg => {
       make(group, "text", {x: box.x - 6, y: at + 4, "text-anchor": "end"}).textContent = text(v);
     }
   };
-  const zoomTo = to => {
+  const viewAs = to => {
     Object.assign(view, to);
     area.setAttribute("viewBox", [view.x, view.y, view.w, view.h].join(" "));
+    // Words and rings keep their size.
+    const a = view.w / box.w, d = view.h / box.h;
+    for (const {element, u, v} of labels)
+      element.setAttribute("transform", `matrix(${a} 0 0 ${d} ${u - a * u} ${v - d * v})`);
+  };
+  const zoomTo = to => {
+    viewAs(to);
     drawTicks();
   };
   const reset = () => {
-    Object.assign(view, box);
-    area.setAttribute("viewBox", [box.x, box.y, box.w, box.h].join(" "));
+    viewAs(box);
     group.replaceChildren(...whole.cloneNode(true).childNodes);
   };
 
@@ -119,17 +149,23 @@ const chartOf = svg => {
     }
     return far_px > least ? best : null;
   };
+  const wordsOf = p => {
+    const place = svg.dataset.equal ? x.words(p[0]) + ", " + y.words(p[1]) : y.words(p[1]);
+    return p[2] ? p[2] + " at " + place : place;
+  };
   const show = (event, at) => {
-    const words = ["x " + text(x.value(at.x)) + "   y " + text(y.value(at.y))];
+    const words = ["x " + x.words(at.x) + "   y " + y.words(at.y)];
     for (const line of lines) {
       const p = nearest(line, at);
-      if (!p) continue;
-      words.push(line.name + ": " + (svg.dataset.equal ? text(x.value(p[0])) + ", " : "") + text(y.value(p[1])));
+      if (p) words.push(line.name + ": " + wordsOf(p));
     }
     tip.textContent = words.join("\n");
-    tip.style.left = Math.min(event.pageX + 14, window.scrollX + window.innerWidth - 260) + "px";
-    tip.style.top = event.pageY + 14 + "px";
     tip.hidden = false;
+    // Beside the pointer, on its other side where the window ends.
+    const w = tip.offsetWidth, h = tip.offsetHeight, root = document.documentElement;
+    const isRight = root.clientWidth >= event.clientX + 14 + w, isBelow = root.clientHeight >= event.clientY + 14 + h;
+    tip.style.left = Math.max(event.pageX + (isRight ? 14 : -14 - w), window.scrollX) + "px";
+    tip.style.top = Math.max(event.pageY + (isBelow ? 14 : -14 - h), window.scrollY) + "px";
     for (const [key, v] of [["x1", at.x], ["x2", at.x], ["y1", view.y], ["y2", view.y + view.h]])
       cursor.setAttribute(key, v);
     cursor.setAttribute("visibility", "visible");
@@ -149,15 +185,20 @@ const chartOf = svg => {
     return {x: r.x + 0.5 * (r.w - factor * box.w), y: r.y + 0.5 * (r.h - factor * box.h),
             w: factor * box.w, h: factor * box.h};
   };
+  const release = () => {
+    from = null;
+    frame.setAttribute("visibility", "hidden");
+  };
   svg.addEventListener("pointerdown", event => {
     const at = pointOf(event);
     if (event.button !== 0 || !at.inside) return;
     event.preventDefault();
+    svg.setPointerCapture(event.pointerId);  // a drag may end anywhere
     from = at;
   });
   svg.addEventListener("pointermove", event => {
     const at = pointOf(event);
-    if (!at.inside) return hide();
+    if (!at.inside && !from) return hide();
     show(event, at);
     if (!from) return;
     const r = chosen(at);
@@ -167,15 +208,14 @@ const chartOf = svg => {
   svg.addEventListener("pointerup", event => {
     if (!from) return;
     const r = chosen(pointOf(event));
-    from = null;
-    frame.setAttribute("visibility", "hidden");
+    release();
     if (r.w > view.w / 60 && r.h > view.h / 60) zoomTo(r);
   });
-  svg.addEventListener("pointerleave", () => {
-    from = null;
-    frame.setAttribute("visibility", "hidden");
-    hide();
-  });
+  for (const end of ["pointerleave", "pointercancel"])
+    svg.addEventListener(end, () => {
+      release();
+      hide();
+    });
   svg.addEventListener("dblclick", reset);
 };
 

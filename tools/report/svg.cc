@@ -20,8 +20,8 @@ std::string attribute(const char* name, double value) {
   return joined({" ", name, "=\"", number(value, 1), "\""});
 }
 
-std::string pair_text(const Eigen::Vector2d& p) {
-  return joined({number(p.x(), 1), ",", number(p.y(), 1)});
+std::string pair_text(const Eigen::Vector2d& p, int digits = 1) {
+  return joined({number(p.x(), digits), ",", number(p.y(), digits)});
 }
 
 const char* to_string(Anchor anchor) {
@@ -84,10 +84,10 @@ void Svg::line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::string_v
                    attribute("y2", b.y()), " ", attributes, "/>\n"});
 }
 
-void Svg::polyline(const std::vector<Eigen::Vector2d>& points, std::string_view attributes) {
+void Svg::polyline(const std::vector<Eigen::Vector2d>& points, std::string_view attributes, int digits) {
   if (points.size() < 2) return;
   body_ += "<polyline fill=\"none\" points=\"";
-  for (const Eigen::Vector2d& p : points) body_ += joined({pair_text(p), " "});
+  for (const Eigen::Vector2d& p : points) body_ += joined({pair_text(p, digits), " "});
   body_ += joined({"\" ", attributes, "/>\n"});
 }
 
@@ -116,7 +116,7 @@ void Svg::dots(const std::vector<Eigen::Vector2d>& points, double side_px, std::
   if (points.empty()) return;
   body_ += joined({"<path stroke=\"", colour, "\" stroke-width=\"", number(side_px, 1),
                    "\" stroke-linecap=\"square\" d=\""});
-  for (const Eigen::Vector2d& p : points) body_ += joined({"M", pair_text(p), "h0"});
+  for (const Eigen::Vector2d& p : points) body_ += joined({"M", pair_text(p, 2), "h0"});
   body_ += "\"/>\n";
 }
 

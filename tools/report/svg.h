@@ -23,7 +23,8 @@ class Svg {
 
   // `attributes` goes into the element as it is, like `class="axis"`.
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::string_view attributes);
-  void polyline(const std::vector<Eigen::Vector2d>& points, std::string_view attributes);
+  // `digits`: of the pixels; what the page's script zooms into or reads values from needs more of them.
+  void polyline(const std::vector<Eigen::Vector2d>& points, std::string_view attributes, int digits = 1);
   void rectangle(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view attributes);
   void circle(const Eigen::Vector2d& centre, double radius_px, std::string_view attributes);
   void text(const Eigen::Vector2d& at, std::string_view text, Anchor anchor,

@@ -58,6 +58,15 @@ TEST(Axis, TicksOfOneAxisHaveDifferentTexts) {
   }
 }
 
+TEST(Axis, LinesFarAboveZeroKeepOffTheFrame) {
+  for (const Axis& axis : {Axis{"MB", false, 0.0}, Axis{"MB"}}) {
+    const Scale scale = scale_around(axis, {20.0, 150.0, 160.0}, true);
+    EXPECT_EQ(scale.low, 0.0);
+    EXPECT_NEAR(scale.high, 1.04 * 160.0, 1e-9);
+  }
+  EXPECT_NEAR(scale_around({"MB", false, 0.0}, {150.0, 160.0}, true).high, 1.04 * 160.0, 1e-9);
+}
+
 TEST(Plot, MissingPointsBreakALine) {
   Plot plot = small_plot();
   plot.line("run", {{0, 1}, {1, 2}, {NAN, NAN}, {5, 1}, {6, 2}}, run_style(0));
@@ -113,7 +122,9 @@ TEST(Plot, ColouredLineShowsItsValuesAndABar) {
   EXPECT_EQ(count_of(svg, "<polyline"), 2U) << "one piece a colour";
   EXPECT_EQ(count_of(svg, "stroke=\"" + level_colour(0) + "\""), 1U);
   EXPECT_EQ(count_of(svg, "stroke=\"" + level_colour(kColourLevels - 1) + "\""), 1U);
-  for (const char* part : {">start<", ">error, m<", ">2 and more<"})
+  for (const char* part :
+       {">start<", ">error, m<", ">2 and more<", "data-name=\"error, m\" data-values=\"0 0 ",
+        "data-values=\"5 5 ", "class=\"label\" data-at=\""})
     EXPECT_NE(svg.find(part), std::string::npos) << part << svg;
 }
 
@@ -125,6 +136,30 @@ TEST(Plot, TellsTheScriptItsAxesAndNames) {
   EXPECT_NE(svg.find("data-y=\"0 4 linear\""), std::string::npos);
   EXPECT_NE(svg.find("data-name=\"run &lt;1&gt;\""), std::string::npos);
   EXPECT_EQ(svg.find("data-equal"), std::string::npos);
+}
+
+TEST(Plot, LinesHaveHundredthsOfAPixelToZoomInto) {
+  Plot plot = small_plot();
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i <= 1000; ++i) points.emplace_back(0.3 * i, std::sin(i));
+  plot.line("run", points, run_style(0));
+  plot.dots("points", points, "#333");
+  const std::string svg = plot.svg();
+  const std::regex of_line(R"( \d+\.\d\d,\d+\.\d\d )"), of_dots(R"(M\d+\.\d\d,\d+\.\d\dh0)");
+  EXPECT_TRUE(std::regex_search(svg, of_line));
+  EXPECT_TRUE(std::regex_search(svg, of_dots));
+}
+
+TEST(Plot, LegendNamesOnlyWhatIsDrawn) {
+  Plot plot = small_plot();
+  plot.dots("points", {{1, 1}, {2, 2}}, "#333");
+  plot.dots("none of these", {}, "#d8702a");
+  plot.line("nor this", {{NAN, NAN}}, run_style(0));
+  plot.mark_x("limit", 1.5, run_style(1));
+  const std::string svg = plot.svg();
+  for (const char* name : {">points<", ">limit<"}) EXPECT_NE(svg.find(name), std::string::npos) << name;
+  for (const char* name : {">none of these<", ">nor this<"})
+    EXPECT_EQ(svg.find(name), std::string::npos) << name;
 }
 
 TEST(Plot, LongNamesStayWithinThePicture) {

@@ -27,11 +27,16 @@ class Element {
   get childNodes() { return this.children; }
   cloneNode() { const copy = new Element(this.name); copy.children = this.children.slice(); return copy; }
   addEventListener(kind, listener) { this.listeners[kind] = listener; }
-  querySelector(what) { return {"svg.area": this.area, "g.ticks": this.ticks}[what]; }
-  querySelectorAll() { return this.children.filter(c => c.name === "polyline"); }
+  remove() { this.isRemoved = true; }
+  setPointerCapture(id) { this.captured = id; }
+  querySelector(what) { return {"svg.area": this.area, "g.ticks": this.ticks, title: this.title}[what]; }
+  querySelectorAll(what) {
+    return this.children.filter(c => c.name === (what.startsWith("g") ? "g" : "polyline"));
+  }
   getBoundingClientRect() { return {left: 10, top: 20, width: 520}; }
   send(kind, x, y) {
-    this.listeners[kind]({clientX: 10 + x, clientY: 20 + y, pageX: x, pageY: y, button: 0, preventDefault() {}});
+    this.listeners[kind]({clientX: 10 + x, clientY: 20 + y, pageX: 10 + x, pageY: 20 + y, button: 0, pointerId: 7,
+                          preventDefault() {}});
   }
 }
 const make = (name, attributes) => {
@@ -42,25 +47,45 @@ const make = (name, attributes) => {
 const area = make("svg", {x: 62, y: 30, width: 444, height: 246, viewBox: "62 30 444 246"});
 area.appendChild(make("polyline", {"data-name": "run", points: "62,276 284,153 506,30 "}));
 area.appendChild(make("polyline", {"data-name": "", points: "62,30 506,30 "}));
+area.appendChild(make("polyline", {"data-name": "error, m", points: "395,91.5 400,400 ", "data-values": "0.25 0.5"}));
+const label = area.appendChild(make("g", {"data-at": "100,200"}));
 const ticks = make("g", {}), svg = make("svg", {width: 520});
 ticks.children = ["as drawn"];
 svg.dataset = {x: "0 100 linear", y: "1 100 log"};
-Object.assign(svg, {area, ticks});
+const title = make("title", {});
+title.textContent = "Height";
+Object.assign(svg, {area, ticks, title});
 const body = make("body", {}), hint = make("p", {});
-global.document = {body, createElement: name => new Element(name), createElementNS: (_, name) => new Element(name),
+const root = {clientWidth: 1000, clientHeight: 700};
+global.document = {body, documentElement: root, createElement: name => new Element(name), createElementNS: (_, name) => new Element(name),
                    querySelectorAll: () => [svg], getElementById: () => hint};
-global.window = {scrollX: 0, innerWidth: 1000};
+global.window = {scrollX: 0, scrollY: 0};
 )JS";
 
 constexpr char kCheck[] = R"JS(
 const tip = body.children[0];
 assert(hint.textContent.includes("zoom"));
+// The browser has no title to show over the values; screen readers have it.
+assert(title.isRemoved);
+assert.strictEqual(svg.getAttribute("aria-label"), "Height");
+Object.assign(tip, {offsetWidth: 200, offsetHeight: 40});
 // Values under the pointer, which is near the line's middle point.
 svg.send("pointermove", 290, 153);
 assert.strictEqual(tip.hidden, false);
 assert.strictEqual(tip.textContent.split("\n").length, 2, tip.textContent);
 assert(tip.textContent.includes("y 10"), tip.textContent);
-assert(tip.textContent.includes("run: 10"), tip.textContent);
+assert(tip.textContent.endsWith("run: 10"), tip.textContent);
+// Beside the pointer, and within the window.
+assert.deepStrictEqual([tip.style.left, tip.style.top], ["314px", "187px"]);
+Object.assign(root, {clientWidth: 513, clientHeight: 226});
+svg.send("pointermove", 290, 153);
+assert.deepStrictEqual([tip.style.left, tip.style.top], ["86px", "119px"]);
+Object.assign(root, {clientWidth: 1000, clientHeight: 700});
+// A line's own values; of a point under the diagram's edge the edge.
+svg.send("pointermove", 395, 91.5);
+assert(tip.textContent.endsWith("error, m: 0.25 at 31.62"), tip.textContent);
+svg.send("pointermove", 402, 270);
+assert(tip.textContent.endsWith("error, m: 0.5 at under 1"), tip.textContent);
 svg.send("pointermove", 5, 5);
 assert.strictEqual(tip.hidden, true);
 // Far from every point of the line it has no value.
@@ -74,11 +99,27 @@ assert.deepStrictEqual(area.getAttribute("viewBox").split(" ").map(Number), [284
 const words = ticks.children.filter(c => c.name === "text").map(c => c.textContent);
 assert(words.includes("50") && words.includes("75") && words.includes("20"), words.join());
 assert(!words.includes("100"), words.join());
+// A label stays at its place, in its size.
+assert.strictEqual(label.getAttribute("transform"), "matrix(0.25 0 0 0.25 75 150)");
 svg.send("pointermove", 62, 276);  // the corner is the rectangle's
 assert(tip.textContent.startsWith("x 50   y 10"), tip.textContent);
 svg.listeners.dblclick();
 assert.strictEqual(area.getAttribute("viewBox"), "62 30 444 246");
 assert.deepStrictEqual(ticks.children, ["as drawn"]);
+assert.strictEqual(label.getAttribute("transform"), "matrix(1 0 0 1 0 0)");
+// A drag that ends outside takes all up to the edge.
+svg.send("pointerdown", 284, 153);
+assert.strictEqual(svg.captured, 7);
+svg.send("pointermove", 600, 900);
+assert.strictEqual(tip.hidden, false);
+svg.send("pointerup", 600, 900);
+assert.strictEqual(area.getAttribute("viewBox"), "284 153 222 123");
+svg.listeners.dblclick();
+// What is taken away from the page while a drag is on ends it.
+svg.send("pointerdown", 284, 153);
+svg.listeners.pointercancel();
+svg.send("pointerup", 395, 250);
+assert.strictEqual(area.getAttribute("viewBox"), "62 30 444 246");
 // A click is no zoom.
 svg.send("pointerdown", 284, 153);
 svg.send("pointerup", 285, 153);
