@@ -43,6 +43,7 @@ FrontEnd::FrontEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* 
       odometry_(config.odometry),
       uncertainty_(rig),
       repeated_(static_cast<std::size_t>(config.extractor.features)),
+      fixed_(static_cast<std::size_t>(config.extractor.features)),
       imu_(kImuWaiting, kImuKept),
       wheels_(kWheelsWaiting, kWheelsKept),
       wheel_motion_(config.wheels, points.wheels_m),
@@ -142,7 +143,7 @@ Refusal FrontEnd::refusal_of(const Frame& frame, bool blind) const {
     case State::kInitialising:
       return initialiser_.refusal();
     case State::kSettling:
-      return validity_.refusal();
+      return explained(validity_.refusal());
     case State::kLost:
       return {Reason::kLost, static_cast<double>(result_.inliers),
               static_cast<double>(config_.tracking.min_inliers)};
@@ -150,6 +151,22 @@ Refusal FrontEnd::refusal_of(const Frame& frame, bool blind) const {
       return {.reason = Reason::kPlaceNotRecognised};
     default:
       return {};
+  }
+}
+
+// What moves with the camera contradicts every motion: it is named in the place of what it causes.
+Refusal FrontEnd::explained(const Refusal& refusal) const {
+  switch (refusal.reason) {
+    case Reason::kField:
+    case Reason::kExcess:
+    case Reason::kNoise:
+    case Reason::kSoundAgain:
+    case Reason::kDisagreement:
+      if (fixed_.share() > FixedFeatures::kMostShare)
+        return {Reason::kMovesWithCamera, fixed_.share(), FixedFeatures::kMostShare};
+      return refusal;
+    default:
+      return refusal;
   }
 }
 
@@ -220,6 +237,7 @@ void FrontEnd::start_map(const MappingReply& reply) {
   uncertainty_.begin();
   recovery_.begin_map();
   validity_.begin_map();
+  fixed_.forget_reference();
   valid_utime_.reset();
   carried_.clear();
   // A new map's two keyframes lie far apart: it may have its third with the next frame.
@@ -424,6 +442,7 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome ou
   recovery_.note_tracked();
   tracker_.accept(*frame, outcome);
   record(relative_to_reference(*frame, outcome));
+  look_for_fixed_features(*frame);
   if (!still) maybe_keyframe(frame, outcome);
   const MapJudgement& judgement = tracker_.view()->judgement;
   if (judgement.settled(frame->utime) && !waiting_.empty()) pose_waiting_frames();
@@ -443,8 +462,15 @@ void FrontEnd::note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome ou
                           repeated_share_ > Validity::kFrozenShare);
 }
 
+void FrontEnd::look_for_fixed_features(const Frame& frame) {
+  const RigCamera& first = tracker_.view()->rig.cameras.front();
+  fixed_.add(frame.views[0].set, frame.views[0].grid, first.camera,
+             tracker_.T_world_body().q * first.T_body_camera.q, frame.utime);
+}
+
 void FrontEnd::note_lost(const std::shared_ptr<Frame>& frame) {
   standstill_.note_loss();
+  fixed_.forget_reference();
   validity_.note_lost();
   if (!is_lost(state_)) ++counts_.lost;
   const Recovery::Verdict verdict = recovery_.note_lost(frame->utime);

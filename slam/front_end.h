@@ -23,6 +23,7 @@
 #include "slam/recovery.h"
 #include "slam/sample_queue.h"
 #include "slam/standstill.h"
+#include "slam/tracking/fixed_features.h"
 #include "slam/tracking/initialiser.h"
 #include "slam/tracking/keyframe_policy.h"
 #include "slam/tracking/repeated_features.h"
@@ -104,6 +105,8 @@ class FrontEnd {
   void note_relocalised(const Frame& frame, const TrackOutcome& outcome);
   void note_tracked(const std::shared_ptr<Frame>& frame, TrackOutcome outcome);
   void note_lost(const std::shared_ptr<Frame>& frame);
+  void look_for_fixed_features(const Frame& frame);
+  [[nodiscard]] Refusal explained(const Refusal& refusal) const;
   void give_up_map(MappingJobKind kind, const std::shared_ptr<Frame>& frame);
   void maybe_keyframe(const std::shared_ptr<Frame>& frame, const TrackOutcome& outcome);
   void pose_waiting_frames();
@@ -128,6 +131,7 @@ class FrontEnd {
   Standstill standstill_;
   RepeatedFeatures repeated_;
   double repeated_share_ = 0;  // of the present frame
+  FixedFeatures fixed_;
   Validity validity_;
   SampleQueue<ImuSample> imu_;
   SampleQueue<WheelSample> wheels_;

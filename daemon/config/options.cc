@@ -87,7 +87,7 @@ void add_options(CLI::App* app, Parsed* parsed) {
       ->type_name("LOG");
   app->add_option("--trajectory", o.trajectory,
                   "Final trajectory (TUM format, T_map_body) of the map with most frames; further maps go to "
-                  "NAME.map2.tum and so on")
+                  "NAME.map2.tum and so on, frames whose map was never sound to NAME.unsound.tum")
       ->type_name("FILE");
   app->add_option("--live-trajectory", o.live_trajectory,
                   "Live trajectory: each frame's pose as it was published as valid")
@@ -108,16 +108,19 @@ void add_options(CLI::App* app, Parsed* parsed) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
-// True for NAME.map2.tum, NAME.map3.tum, ... where the trajectory is NAME.tum.
+// True for NAME.map2.tum, NAME.unsound.tum, NAME.map2.unsound.tum, ... where the trajectory is NAME.tum.
 bool is_further_map_of(const std::string& trajectory, const std::filesystem::path& path) {
   std::error_code ignored;
   const std::filesystem::path first =
       std::filesystem::weakly_canonical(std::filesystem::absolute(trajectory), ignored);
   const std::string start = first.stem().string() + ".map";
-  const std::string name = path.stem().string();
+  std::string name = path.stem().string();
+  const bool unsound = name.ends_with(".unsound");
+  if (unsound) name = std::filesystem::path(name).stem().string();
+  const bool further = name.starts_with(start) && name.size() > start.size() &&
+                       name.find_first_not_of("0123456789", start.size()) == std::string::npos;
   return path.parent_path() == first.parent_path() && path.extension() == first.extension() &&
-         name.starts_with(start) && name.size() > start.size() &&
-         name.find_first_not_of("0123456789", start.size()) == std::string::npos;
+         (further || (unsound && name == first.stem().string()));
 }
 
 void check(const Parsed& parsed) {

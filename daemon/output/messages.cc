@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/output/messages.h"
 
+#include "daemon/output/sound_frames.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -227,13 +229,15 @@ trajectory_t make_trajectory(const RunEnd& end) {
   m.scale_state = static_cast<std::int8_t>(end.last.scale);
   m.frames = end.frames;
   for (const slam::MapTrajectory& trajectory : end.trajectories) {
-    for (const slam::PosedFrame& frame : trajectory.frames) {
+    const std::vector<std::uint8_t> sound = sound_frames(trajectory, end.live_utimes);
+    for (std::size_t i = 0; i < trajectory.frames.size(); ++i) {
+      const slam::PosedFrame& frame = trajectory.frames[i];
       trajectory_pose_t pose{};
       pose.utime = frame.utime;
       pose.map_id = trajectory.map_id;
       set_pose(frame.T_map_body, pose.position, pose.orientation);
       for (double& x : pose.position) x *= end.unit_scale;
-      pose.is_final = 1;
+      pose.is_final = sound[i] != 0 ? 1 : 0;
       pose.was_live = std::binary_search(end.live_utimes.begin(), end.live_utimes.end(), frame.utime) ? 1 : 0;
       m.poses.push_back(pose);
     }

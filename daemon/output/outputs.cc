@@ -165,7 +165,7 @@ Outputs::Paths Outputs::close_log() {
 
 Outputs::Paths Outputs::write_trajectories(const RunEnd& end) const {
   if (options_.trajectory.empty()) return {};
-  return write_final_trajectories(options_.trajectory, end.trajectories, end.unit_scale);
+  return write_final_trajectories(options_.trajectory, end.trajectories, end.live_utimes, end.unit_scale);
 }
 
 Outputs::Paths Outputs::close_live_trajectory() {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/output/trajectory_file.h"
 
+#include "daemon/output/sound_frames.h"
+
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -16,15 +18,41 @@ void put(std::FILE* stream, const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stream);
 }
 
-void write_one(const std::string& path, const slam::MapTrajectory& trajectory, double unit_scale) {
+void write_frames(const std::string& path, std::span<const slam::PosedFrame> frames, const char* nothing,
+                  double unit_scale) {
   ipc::OutputFile file(path);
   put(file.stream(), kHeader);
-  if (trajectory.frames.empty()) put(file.stream(), "# no frame has a pose: no map was made\n");
-  for (const slam::PosedFrame& frame : trajectory.frames) {
+  if (frames.empty()) put(file.stream(), nothing);
+  for (const slam::PosedFrame& frame : frames) {
     const slam::SE3 T{frame.T_map_body.q, frame.T_map_body.t * unit_scale};
     put(file.stream(), tum_line(frame.utime, T));
   }
   file.close();
+}
+
+// Removes the file of unsound frames that an earlier run left.
+void write_one(const std::string& path, const slam::MapTrajectory& trajectory,
+               std::span<const std::int64_t> live_utimes, double unit_scale,
+               std::vector<std::string>* written) {
+  const std::vector<std::uint8_t> is_sound = sound_frames(trajectory, live_utimes);
+  std::vector<slam::PosedFrame> sound, unsound;
+  for (std::size_t i = 0; i < is_sound.size(); ++i)
+    (is_sound[i] != 0 ? sound : unsound).push_back(trajectory.frames[i]);
+  write_frames(path, sound,
+               unsound.empty() ? "# no frame has a pose: no map was made\n"
+                               : "# no frame has a sound pose: no pose was valid\n",
+               unit_scale);
+  written->push_back(path);
+  std::error_code ignored;
+  // A device or pipe has no neighbour.
+  if (path == "-" || !std::filesystem::is_regular_file(path, ignored)) return;
+  const std::string beside = unsound_path(path);
+  if (unsound.empty()) {
+    std::filesystem::remove(beside, ignored);
+    return;
+  }
+  write_frames(beside, unsound, "", unit_scale);
+  written->push_back(beside);
 }
 
 }  // namespace
@@ -79,20 +107,30 @@ std::string trajectory_path(const std::string& path, int map_number) {
       .string();
 }
 
+std::string unsound_path(const std::string& path) {
+  const std::filesystem::path p(path);
+  return (p.parent_path() / fmt::format("{}.unsound{}", p.stem().string(), p.extension().string())).string();
+}
+
 std::vector<std::string> write_final_trajectories(const std::string& path,
                                                   const std::vector<slam::MapTrajectory>& trajectories,
+                                                  std::span<const std::int64_t> live_utimes,
                                                   double unit_scale) {
-  write_one(path, trajectories.empty() ? slam::MapTrajectory{} : trajectories.front(), unit_scale);
-  std::vector<std::string> written{path};
+  std::vector<std::string> written;
+  write_one(path, trajectories.empty() ? slam::MapTrajectory{} : trajectories.front(), live_utimes,
+            unit_scale, &written);
   std::error_code ignored;
   // A device or pipe has no neighbours that could take the other maps.
   if (path == "-" || !std::filesystem::is_regular_file(path, ignored)) return written;
   int number = 2;
   for (std::size_t i = 1; i < trajectories.size(); ++i, ++number) {
-    written.push_back(trajectory_path(path, number));
-    write_one(written.back(), trajectories[i], unit_scale);
+    write_one(trajectory_path(path, number), trajectories[i], live_utimes, unit_scale, &written);
   }
-  while (std::filesystem::remove(trajectory_path(path, number), ignored)) ++number;
+  for (;; ++number) {
+    const std::string stale = trajectory_path(path, number);
+    std::filesystem::remove(unsound_path(stale), ignored);
+    if (!std::filesystem::remove(stale, ignored)) break;
+  }
   return written;
 }
 

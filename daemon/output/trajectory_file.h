@@ -50,11 +50,17 @@ class LiveTrajectory final : public PoseSink {
 // "dir/NAME.map2.tum" for dir/NAME.tum and 2.
 [[nodiscard]] std::string trajectory_path(const std::string& path, int map_number);
 
-// Writes the first trajectory to `path`, the others to NAME.map2.tum and so on. Without any, the file holds a
-// comment only. Removes further such files of an earlier run. Positions are multiplied by unit_scale. Returns
-// the written paths. Throws std::runtime_error.
+// "dir/NAME.unsound.tum" for dir/NAME.tum.
+[[nodiscard]] std::string unsound_path(const std::string& path);
+
+// Writes the first trajectory to `path`, the others to NAME.map2.tum and so on. Frames whose map was never
+// sound near them (sound_frames.h) go to unsound_path() of that file instead, where there are any. Without
+// other frames, the file holds a comment only. Removes further such files of an earlier run. Positions are
+// multiplied by unit_scale. `live_utimes`: of valid poses, ascending. Returns the written paths. Throws
+// std::runtime_error.
 std::vector<std::string> write_final_trajectories(const std::string& path,
                                                   const std::vector<slam::MapTrajectory>& trajectories,
+                                                  std::span<const std::int64_t> live_utimes,
                                                   double unit_scale);
 
 }  // namespace farpoint::daemon

@@ -2,9 +2,11 @@
 #include "slam/tracking/initialiser.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "slam/image/descriptor_search.h"
 #include "slam/tracking/constant_velocity.h"
+#include "slam/tracking/fixed_features.h"
 #include "slam/tracking/work_space.h"
 
 namespace farpoint::slam {
@@ -158,13 +160,32 @@ bool Initialiser::shows_parallax(const TwoViewResult& motion) const {
                                           static_cast<std::ptrdiff_t>(motion.inliers / 4));
 }
 
-Refusal Initialiser::refusal_of(const TwoViewResult& motion) {
+// Most matches keep their place. Where many others flow, they belong to something that moves with the camera:
+// of a scene that a standing camera sees, a smaller part moves.
+Refusal Initialiser::standing_or_blocked(const Frame& frame) const {
+  constexpr float kStill_px = 1.5F, kFlow_px = 5.0F;
+  constexpr double kFlowingShare = 0.2;
+  int still = 0, flowing = 0;
+  for (const Pairing& p : used_) {
+    const Feature& a = view_of(*reference_).set.features[p.feature_first];
+    const Feature& b = view_of(frame).set.features[p.feature_second];
+    const float moved_px = std::hypot(b.u_px - a.u_px, b.v_px - a.v_px);
+    still += moved_px < kStill_px ? 1 : 0;
+    flowing += moved_px > kFlow_px ? 1 : 0;
+  }
+  const auto matches = static_cast<double>(used_.size());
+  if (flowing < kFlowingShare * matches) return {.reason = Reason::kStanding};
+  return {Reason::kMovesWithCamera, still / matches, FixedFeatures::kMostShare};
+}
+
+Refusal Initialiser::refusal_of(const TwoViewResult& motion, const Frame& frame) {
   switch (motion.status) {
     case TwoViewStatus::kTooFewMatches:
       return {Reason::kFewMatches, static_cast<double>(last_matches_), kMinMatches};
     case TwoViewStatus::kNoParallax: {
       const double turn_rad = Eigen::AngleAxisd(motion.T_2_1.q).angle();
-      return {turn_rad > kTurn_rad ? Reason::kTurningOnly : Reason::kStanding, turn_rad};
+      if (turn_rad > kTurn_rad) return {Reason::kTurningOnly, turn_rad};
+      return standing_or_blocked(frame);
     }
     case TwoViewStatus::kAmbiguous:
       return {.reason = Reason::kAmbiguousStart};
@@ -187,7 +208,7 @@ bool Initialiser::solve(const std::shared_ptr<Frame>& frame) {
   const TwoViewResult& r =
       estimate_two_view(first_, second_, kCornerSigma_px / rig_camera_.camera.focal_px(), {}, &two_view_);
   if (r.status != TwoViewStatus::kOk || !shows_parallax(r)) {
-    refusal_ = refusal_of(r);
+    refusal_ = refusal_of(r, *frame);
     return false;
   }
   pair_.first = reference_;

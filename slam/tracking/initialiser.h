@@ -54,7 +54,8 @@ class Initialiser {
   [[nodiscard]] bool solve(const std::shared_ptr<Frame>& frame);
   void unproject_pairs(const Frame& frame);
   [[nodiscard]] bool shows_parallax(const TwoViewResult& motion) const;
-  [[nodiscard]] Refusal refusal_of(const TwoViewResult& motion);
+  [[nodiscard]] Refusal refusal_of(const TwoViewResult& motion, const Frame& frame);
+  [[nodiscard]] Refusal standing_or_blocked(const Frame& frame) const;
 
   const EstimatorConfig config_;
   const int camera_;

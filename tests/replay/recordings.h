@@ -13,6 +13,9 @@ inline const std::filesystem::path kData =
     std::filesystem::path(test::source_dir()) / ".." / "shared" / "data";
 inline const std::filesystem::path kBin = std::filesystem::path(test::binary_dir()) / "bin";
 
+// Settings of a run with one camera and nothing else, so that a figure is the camera's: one line a sensor.
+inline const std::string kOneCameraAlone = " --set camera.use=one";
+
 // Status of a shell command; what it prints goes to this test's output.
 inline int run(const std::string& command) {
   const int status = std::system(command.c_str());
