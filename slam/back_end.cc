@@ -10,8 +10,7 @@ BackEnd::BackEnd(const EstimatorConfig& config, const Rig& rig, MappingRings* ri
     : config_(config),
       points_(points),
       rings_(*rings),
-      wheels_(config.wheels, points.wheels_m,
-              rig.cameras.size() > 1 ? MetreSource::kCameras : MetreSource::kWheels),
+      wheels_(config.wheels, points.wheels_m),
       mapper_(config, rig),
       poser_(config, static_cast<int>(rig.cameras.size())) {
   if (config.wheels.use) mapper_.use_motion(&wheels_);

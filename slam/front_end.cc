@@ -603,9 +603,8 @@ void FrontEnd::note_metre() {
   if (tracker_.view() == nullptr) return;
   const MapJudgement& judgement = tracker_.view()->judgement;
   result_.wheels = judgement.wheels;
-  if (!judgement.metric) return;
-  result_.scale = ScaleState::kMetric;
-  result_.metre = judgement.unit_sigma > 0.0 ? MetreSource::kWheels : MetreSource::kCameras;
+  result_.metre = judgement.metre();
+  if (judgement.metric) result_.scale = ScaleState::kMetric;
 }
 
 // Of a pose that adds a frame's motion. One that is held adds none.

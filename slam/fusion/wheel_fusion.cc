@@ -42,8 +42,8 @@ double squared(double x) {
 
 }  // namespace
 
-WheelFusion::WheelFusion(const WheelConfig& config, const Eigen::Vector3d& point_m, MetreSource metre)
-    : config_(config), point_m_(point_m), metre_(metre), track_(track_options(config)) {}
+WheelFusion::WheelFusion(const WheelConfig& config, const Eigen::Vector3d& point_m)
+    : config_(config), point_m_(point_m), track_(track_options(config)) {}
 
 void WheelFusion::add(std::span<const WheelSample> samples) {
   for (const WheelSample& s : samples)
@@ -79,7 +79,7 @@ void WheelFusion::add_to(const Map& map, std::span<const int> pose_index, const 
                          BundleProblem* problem) {
   factors_.clear();
   if (!judgement.metric || judgement.wheels != WheelTrust::kTrusted) return;
-  const double factor = metre_ == MetreSource::kCameras ? judgement.wheel_factor : 1.0;
+  const double factor = judgement.metre() == MetreSource::kCameras ? judgement.wheel_factor : 1.0;
   map.keyframes().for_each([&](KeyframeHandle to, const Keyframe&) {
     const ChainLink* link = map.chain().link_to(to);
     if (link == nullptr || !link->wheels || link->wheels_slipped) return;
@@ -108,7 +108,7 @@ MotionVerdict WheelFusion::judge(Map* map, KeyframeHandle newest, const MapJudge
   const std::optional<Consensus> all = consensus();
   if (!all) return verdict;
   mark_slips(*all);
-  if (metre_ == MetreSource::kCameras)
+  if (judgement.metre() == MetreSource::kCameras)
     judge_factor(*all, &verdict);
   else
     judge_unit(*all, judgement, &verdict);

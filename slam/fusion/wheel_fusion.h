@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The wheels in the map: their motion between keyframes, held against the images' motion, as factors of local
-// bundle adjustment. Where one camera makes the map, they give its metre; where two do, they are judged by
-// it.
+// bundle adjustment. A map without a metre gets theirs; by the metre that two cameras gave they are judged.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +26,7 @@ class WheelFusion final : public MotionFactors {
   static constexpr double kMetricSigma = 0.05;
 
   // `point_m`: where the wheels measure, from the map's body, body axes.
-  WheelFusion(const WheelConfig& config, const Eigen::Vector3d& point_m, MetreSource metre);
+  WheelFusion(const WheelConfig& config, const Eigen::Vector3d& point_m);
 
   // Samples in the order of time, as they left the sensor.
   void add(std::span<const WheelSample> samples);
@@ -71,7 +70,6 @@ class WheelFusion final : public MotionFactors {
 
   const WheelConfig config_;
   const Eigen::Vector3d point_m_;
-  const MetreSource metre_;
   WheelTrack track_;
   std::deque<WheelFactor> factors_;  // of the present problem
   std::vector<Comparison> comparisons_;

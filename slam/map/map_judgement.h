@@ -39,6 +39,11 @@ struct MapJudgement {
   double wheel_factor = 1.0;  // metres driven in one that the wheels tell
   double unit_sigma = 0.0;    // of the metre, relative, where wheels gave it; 0 without them
 
+  [[nodiscard]] MetreSource metre() const {
+    if (!metric) return MetreSource::kNone;
+    return unit_sigma > 0.0 ? MetreSource::kWheels : MetreSource::kCameras;
+  }
+
   // How long the map has been sound, as of a frame at `utime`. The time since the last adjustment counts: a
   // vehicle that stands makes no keyframes.
   [[nodiscard]] double sound_time_s(std::int64_t utime) const {

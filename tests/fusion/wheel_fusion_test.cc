@@ -24,8 +24,8 @@ constexpr double kKeyframe_s = 0.2, kSample_s = 0.02;
 // A drive along an arc with keyframes at their true places, in units of the map, and samples of its wheels.
 class Drive {
  public:
-  explicit Drive(const WheelConfig& config, MetreSource metre, const Eigen::Vector3d& point_m = {0, 0, 0})
-      : fusion(config, point_m, metre),
+  explicit Drive(const WheelConfig& config, const Eigen::Vector3d& point_m = {0, 0, 0})
+      : fusion(config, point_m),
         map(CapacityConfig{.keyframes = 300, .landmarks = 10}, two_camera_rig()),
         point_m_(point_m) {}
 
@@ -99,7 +99,7 @@ class Drive {
 };
 
 TEST(WheelFusion, GivesTheMetreWithinTwoSecondsOfDrivingOnce) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.drive(2.0);
   EXPECT_EQ(d.unit_changes, 1);
   EXPECT_NEAR(d.metres_per_unit, 1.0, 1e-3);
@@ -111,7 +111,7 @@ TEST(WheelFusion, GivesTheMetreWithinTwoSecondsOfDrivingOnce) {
 }
 
 TEST(WheelFusion, AYoungMapIsNotCalledMetric) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.judgement.steady = false;
   d.drive(5.0);
   EXPECT_EQ(d.unit_changes, 0);
@@ -121,14 +121,14 @@ TEST(WheelFusion, AYoungMapIsNotCalledMetric) {
 TEST(WheelFusion, AScaleThatTheConfigurationCallsUncertainIsNotCalledMetric) {
   WheelConfig config;
   config.scale_sigma = 0.06;
-  Drive d(config, MetreSource::kWheels);
+  Drive d(config);
   d.drive(10.0);
   EXPECT_EQ(d.unit_changes, 0);
 }
 
 // In a bend a point beside the body drives another way than the body does.
 TEST(WheelFusion, TheMetreIsThatOfTheBodyWhereverTheWheelsMeasure) {
-  Drive d({}, MetreSource::kWheels, {-1.0, 0.8, -0.7});
+  Drive d({}, {-1.0, 0.8, -0.7});
   d.yaw_rate_radps = 0.5;
   d.drive(2.0);
   EXPECT_EQ(d.unit_changes, 1);
@@ -136,7 +136,7 @@ TEST(WheelFusion, TheMetreIsThatOfTheBodyWhereverTheWheelsMeasure) {
 }
 
 TEST(WheelFusion, ASlipIsLeftOutAndTheUnitStays) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.wheel_factor = [](double t) { return t > 8.0 && t < 11.0 ? 1.2 : 1.0; };
   d.drive(20.0);
   EXPECT_GE(d.slipped(), 14);
@@ -148,14 +148,14 @@ TEST(WheelFusion, ASlipIsLeftOutAndTheUnitStays) {
 TEST(WheelFusion, WithoutAGateNothingIsLeftOut) {
   WheelConfig config;
   config.gate_sigmas = 0.0;
-  Drive d(config, MetreSource::kWheels);
+  Drive d(config);
   d.wheel_factor = [](double t) { return t > 8.0 && t < 11.0 ? 1.2 : 1.0; };
   d.drive(20.0);
   EXPECT_EQ(d.slipped(), 0);
 }
 
 TEST(WheelFusion, AUnitTakenFromASlipIsCorrectedOnceTheWheelsHaveHeldForLonger) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.wheel_factor = [](double t) { return t < 3.0 ? 1.3 : 1.0; };
   d.drive(3.0);
   EXPECT_NEAR(d.metres_per_unit, 1.0 / 1.3, 0.01);
@@ -165,7 +165,7 @@ TEST(WheelFusion, AUnitTakenFromASlipIsCorrectedOnceTheWheelsHaveHeldForLonger) 
 }
 
 TEST(WheelFusion, FactorsActOnceTheMapIsMetricAndNotAcrossASlip) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.wheel_factor = [](double t) { return t > 8.0 && t < 9.0 ? 1.2 : 1.0; };
   d.drive(10.0);
   BundleProblem problem;
@@ -190,7 +190,7 @@ TEST(WheelFusion, FactorsActOnceTheMapIsMetricAndNotAcrossASlip) {
 }
 
 TEST(WheelFusion, TheNewestIntervalWaitsForALaterSample) {
-  Drive d({}, MetreSource::kWheels);
+  Drive d({});
   d.drive(2.0);
   const ChainLink* link = std::as_const(d.map).chain().link_to(d.newest);
   ASSERT_NE(link, nullptr);
@@ -207,7 +207,7 @@ void start_metric(Drive* d) {
 }
 
 TEST(WheelFusion, ATyreOfAnotherSizeIsEstimatedByTheCamerasMetre) {
-  Drive d({}, MetreSource::kCameras);
+  Drive d({});
   start_metric(&d);
   d.wheel_factor = [](double) { return 1.03; };
   d.drive(20.0);
@@ -219,7 +219,7 @@ TEST(WheelFusion, ATyreOfAnotherSizeIsEstimatedByTheCamerasMetre) {
 class WrongWheels : public testing::TestWithParam<double> {};
 
 TEST_P(WrongWheels, AreLeftOutWithinTwentySecondsOfDriving) {
-  Drive d({}, MetreSource::kCameras);
+  Drive d({});
   start_metric(&d);
   d.wheel_factor = [](double) { return GetParam(); };
   d.drive(20.0);
@@ -229,9 +229,9 @@ TEST_P(WrongWheels, AreLeftOutWithinTwentySecondsOfDriving) {
 INSTANTIATE_TEST_SUITE_P(Factors, WrongWheels, testing::Values(0.9, 1.1, 3.6, 1.0 / 3.6));
 
 TEST(WheelFusion, AYawRateOfTheWrongSignIsLeftOutInTheFirstBend) {
-  for (const MetreSource metre : {MetreSource::kCameras, MetreSource::kWheels}) {
-    Drive d({}, metre);
-    if (metre == MetreSource::kCameras) start_metric(&d);
+  for (const bool by_cameras : {true, false}) {
+    Drive d({});
+    if (by_cameras) start_metric(&d);
     d.yaw_rate_radps = 0.2;
     d.yaw_gain = [](double) { return -1.0; };
     d.drive(4.0);
