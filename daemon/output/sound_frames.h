@@ -13,7 +13,7 @@ namespace farpoint::daemon {
 // Time from a frame to the nearest valid pose of its map, up to which adjustment holds both to each other:
 // the local window of a vehicle that drives. The young map's frames become valid within it.
 inline constexpr double kSoundReach_s = 5.0;
-// Frames that wait for a map are posed against it once it is sound, however slow the camera: so many at most.
+// Frames that wait for a map are posed against it once it is sound, however slow the camera: N at most.
 inline constexpr std::size_t kWaitingFrames = 60;
 
 // One entry a frame of the trajectory, 1 where its pose is sound: a pose of the map was published as valid at

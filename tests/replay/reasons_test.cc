@@ -295,26 +295,6 @@ TEST_F(RecordedReasons, ABusThatFillsTheImage) {
   expect_told(start_utime() + kFrom * kPeriod_us, "the scene moves, or matches are wrong");
 }
 
-// What a rolling shutter makes of a camera that jerks to the left and to the right: rows are sheared.
-TEST_F(RecordedReasons, ARollingShutterThatShakes) {
-  constexpr int kFrom = 30;
-  constexpr double kShear_px = 1.5;
-  const auto shear = [&](int number, ipc::GreyImage* image) {
-    if (number < kFrom) return;
-    const ipc::GreyImage still = *image;
-    const double edge_px = number % 2 == 0 ? kShear_px : -kShear_px;
-    std::size_t i = 0;
-    for (int y = 0; y < image->height_px; ++y) {
-      const double shift_px = edge_px * (2.0 * y / image->height_px - 1.0);
-      for (int x = 0; x < image->width_px; ++x)
-        image->pixels[i++] = static_cast<std::uint8_t>(std::lround(level_at(still, x + shift_px, y)));
-    }
-  };
-  alter_log(recording(kKitti), log_, {.images = kFrom + 35, .image = shear});
-  replay();
-  expect_told(start_utime() + kFrom * kPeriod_us, "a residual field of ");
-}
-
 // Straight ahead no camera tells its focal length. The drive turns to the right from 5.3 s on: by 10 degrees
 // until 7.5 s, by 28 until 8.7 s, by 80 until 10.6 s. The reason came at 10.4 s, 1.7 s after the first 28
 // degrees. From the first degree on it is 5 s: a calibration cannot be doubted within 2 s of its use.
