@@ -14,7 +14,7 @@ inline const std::filesystem::path kData =
 inline const std::filesystem::path kBin = std::filesystem::path(test::binary_dir()) / "bin";
 
 // Settings of a run with one camera and nothing else, so that a figure is the camera's: one line a sensor.
-inline const std::string kOneCameraAlone = " --set camera.use=one";
+inline const std::string kOneCameraAlone = " --set camera.use=one --set wheels.use=false";
 
 // Status of a shell command; what it prints goes to this test's output.
 inline int run(const std::string& command) {
