@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "tools/evaluate/statistics.h"
 #include "tools/report/html.h"
@@ -56,6 +57,8 @@ struct Margin {
   double metres, share;
 };
 constexpr double kNearlyAll_percent = 99.0;
+// Of the near picture's side: a far picture that is hardly larger shows the same once more.
+constexpr double kWider = 1.2;
 
 double reach_of(const Places& places, const Eigen::Vector2d& middle) {
   std::vector<double> distances;
@@ -64,24 +67,38 @@ double reach_of(const Places& places, const Eigen::Vector2d& middle) {
   return distances.empty() ? 0.0 : percentile(distances, kNearlyAll_percent);
 }
 
-std::string picture(const RunRecord& run, const std::string& title, const Margin& margin) {
-  const std::vector<Eigen::Vector2d> way = way_of(run);
-  if (way.size() < 2) return {};
+// What the pictures of one run share.
+struct MapView {
+  std::vector<Eigen::Vector2d> way;
+  Places places;
+  Eigen::Vector2d middle;
+  double half_way, reach;
+};
+
+MapView view_of(const RunRecord& run) {
+  MapView view{way_of(run), places_of(run), {0, 0}, 0.0, 0.0};
+  if (view.way.empty()) return view;
+  std::tie(view.middle, view.half_way) = square_around(view.way);
+  view.reach = std::max(1.1 * view.half_way, reach_of(view.places, view.middle));
+  return view;
+}
+
+double half_side(const MapView& view, const Margin& margin, bool is_metric) {
+  return std::min(view.half_way + (is_metric ? margin.metres : margin.share * view.half_way), view.reach);
+}
+
+std::string picture(const RunRecord& run, const MapView& view, const std::string& title, double half) {
   const std::string unit = run.length_unit();
-  const auto [middle, half_way] = square_around(way);
-  const Places places = places_of(run);
-  const double room = unit == "m" ? margin.metres : margin.share * half_way;
-  const double half = std::min(half_way + room, std::max(1.1 * half_way, reach_of(places, middle)));
   Plot plot({run.name + ": " + title,
-             {"x, " + unit, false, middle.x() - half, middle.x() + half},
-             {"y, " + unit, false, middle.y() - half, middle.y() + half},
+             {"x, " + unit, false, view.middle.x() - half, view.middle.x() + half},
+             {"y, " + unit, false, view.middle.y() - half, view.middle.y() + half},
              true,
              520,
              520});
-  plot.dots("sigma 30 % and more", places.uncertain, "#bbb", 1.6);
-  plot.dots("points", places.certain, "#333", 1.8);
-  plot.dots("points through VMPs", places.through_vmp, "#d8702a", 2.4);
-  plot.line("way", way, {"#0b3c78", "", 2.0});
+  plot.dots("sigma 30 % and more", view.places.uncertain, "#bbb", 1.6);
+  plot.dots("points", view.places.certain, "#333", 1.8);
+  plot.dots("points through VMPs", view.places.through_vmp, "#d8702a", 2.4);
+  plot.line("way", view.way, {"#0b3c78", "", 2.0});
   return plot.svg();
 }
 
@@ -91,8 +108,13 @@ std::string map_section(const Runs& runs) {
   std::vector<std::string> pictures;
   for (const RunRecord& run : runs) {
     if (run.landmarks() == nullptr || run.landmarks()->landmarks.empty()) continue;
-    pictures.push_back(picture(run, "near the way", {60.0, 0.2}));
-    pictures.push_back(picture(run, "distant points too", {1200.0, 3.0}));
+    const MapView view = view_of(run);
+    if (view.way.size() < 2) continue;
+    const bool is_metric = run.length_unit() == "m";
+    const double near = half_side(view, {60.0, 0.2}, is_metric);
+    const double far = half_side(view, {1200.0, 3.0}, is_metric);
+    pictures.push_back(picture(run, view, "near the way", near));
+    if (far > kWider * near) pictures.push_back(picture(run, view, "distant points too", far));
   }
   return section("Map", "Points of the map with most frames, from above, at the end of the run.",
                  row_of(pictures));

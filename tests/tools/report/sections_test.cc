@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "ipc/channels.h"
@@ -201,6 +202,32 @@ TEST_F(Sections, CsvStandsBesideThePage) {
   for (const char* name : {"page.one.csv", "page.two.csv"})
     EXPECT_TRUE(get(folder / name).starts_with("time_s,state,")) << name;
   EXPECT_EQ(run_farpoint_program("report " + file("one").string() + " -o - --csv").status, 2);
+}
+
+// Points of a run at the given distance to every side of its way's first pose.
+landmarks_t landmarks_around(const RunRecord& run, double distance) {
+  landmarks_t message{};
+  message.nlandmarks = 100;
+  const TimedPose& first = run.run.final_trajectory.poses.front();
+  for (int i = 0; i < message.nlandmarks; ++i) {
+    landmark_t l{};
+    l.map_id = first.map_id;
+    const double angle_rad = 0.02 * 3.14159265 * i;
+    l.position[0] = first.pose.t.x() + distance * std::cos(angle_rad);
+    l.position[1] = first.pose.t.y() + distance * std::sin(angle_rad);
+    message.landmarks.push_back(l);
+  }
+  return message;
+}
+
+TEST_F(Sections, DistantPointsHaveAMapOfTheirOwnWhereThereAreSome) {
+  Runs both = runs(nullptr);
+  both[0].run.log->landmarks = landmarks_around(both[0], 1.0);
+  both[1].run.log->landmarks = landmarks_around(both[1], 800.0);
+  const std::string html = map_section(both);
+  for (const char* title : {"one: near the way<", "two: near the way<", "two: distant points too<"})
+    EXPECT_TRUE(has(html, title)) << title;
+  EXPECT_FALSE(has(html, "one: distant points too<")) << "the same picture twice";
 }
 
 // ---- tracks
