@@ -23,7 +23,7 @@ struct KeyframeView {
   std::vector<LandmarkHandle> landmarks;  // one a feature; null: none. Thinned: one an observation
   // For the search for new landmarks, while the keyframe is recent (CapacityConfig::window_images):
   FeatureSet set;
-  std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature; by the calibration of its day
+  std::vector<Eigen::Vector3f> bearings;  // unit, camera axes; one a feature
   FeatureGrid grid;
   std::shared_ptr<const FrameImage> image;  // pixels for alignment; null: thinned, or no image
 

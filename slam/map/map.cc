@@ -228,6 +228,15 @@ void Map::set_camera(int index, const Camera& camera) {
     // A ray lost at the very edge of the image keeps its old value.
     if (l.host_camera == index) (void)set_bearing(&l);
   });
+  keyframes_.for_each([&](KeyframeHandle, Keyframe& k) {
+    KeyframeView& view = k.views[index];
+    if (!view.has_pixels()) return;
+    for (std::size_t i = 0; i < view.bearings.size(); ++i) {
+      Eigen::Vector3d bearing;
+      if (camera.unproject({view.set.features[i].u_px, view.set.features[i].v_px}, &bearing))
+        view.bearings[i] = bearing.cast<float>();
+    }
+  });
 }
 
 void Map::detach_feature(const Observation& o) {

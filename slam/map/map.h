@@ -88,8 +88,8 @@ class Map {
 
   // --- all of it
 
-  // Sets a refined calibration. Computes the bearings of landmarks anew; poses, inverse depths and the
-  // keyframes' own bearings stay.
+  // Sets a refined calibration. Computes the bearings of landmarks, and of keyframes that keep their pixels,
+  // anew; poses and inverse depths stay.
   void set_camera(int index, const Camera& camera);
   // Sets a refined place of a camera on the body. Precondition: the camera is no landmark's anchor.
   void place_camera(int index, const SE3& T_body_camera) {

@@ -46,15 +46,6 @@ constexpr double kWitnessBorder_px = 12.0;  // from the image's edge and its mas
 // Largest ratio of a match's distance to the second best on the line: every depth on it is as likely.
 constexpr float kSecondBest = 0.85F;
 
-// The calibration may have been refined since the keyframe was made: the view's own bearing is of that day.
-Eigen::Vector3d present_bearing(const Camera& camera, const KeyframeView& view, std::size_t feature) {
-  const Feature& f = view.set.features[feature];
-  Eigen::Vector3d bearing;
-  if (!camera.unproject({f.u_px, f.v_px}, &bearing)) return view.bearings[feature].cast<double>();
-  // In single precision, as in the view.
-  return bearing.cast<float>().cast<double>();
-}
-
 }  // namespace
 
 LandmarkMaker::LandmarkMaker(const EstimatorConfig& config, Map* map, MappingCounts* counts)
@@ -194,8 +185,7 @@ void LandmarkMaker::consume(Observer newer, Observer older, const PairGeometry& 
 void LandmarkMaker::create(Observer newer, Observer older, const PairGeometry& g, const Pair& pair) {
   const Keyframe& k_new = map_.keyframes()[newer.keyframe];
   const Eigen::Vector3d f_new = view_of(newer).bearings[pair.feature_new].cast<double>();
-  const Eigen::Vector3d f_old =
-      present_bearing(map_.camera(older.camera).camera, view_of(older), pair.feature_old);
+  const Eigen::Vector3d f_old = view_of(older).bearings[pair.feature_old].cast<double>();
   const InverseDepth first = triangulate_inverse_depth(f_old, g.T_new_old, f_new);
   const double parallax_rad = parallax_angle(g.T_new_old.q * f_old, f_new);
   const bool baseline = config_.landmarks.mode == LandmarkMode::kBaseline;

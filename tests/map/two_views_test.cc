@@ -146,11 +146,15 @@ TEST_F(TwoViews, ACameraWithoutAnImageSeesNothing) {
 TEST_F(TwoViews, ARefinedCalibrationConcernsItsCameraOnly) {
   const LandmarkHandle first = landmark_of({{a, 0}, {b, 0}}, 0), second = landmark_of({{a, 1}, {b, 1}}, 0);
   const Eigen::Vector3d f0 = map.landmarks()[first].bearing, f1 = map.landmarks()[second].bearing;
+  const Eigen::Vector3f b0 = map.keyframes()[a].views[0].bearings[7],
+                        b1 = map.keyframes()[a].views[1].bearings[7];
   Camera::Parameters p = rig.cameras[1].camera.parameters();
   p.fx_px *= 1.1, p.fy_px *= 1.1;
   map.set_camera(1, Camera(p));
   EXPECT_EQ(map.landmarks()[first].bearing, f0);
   EXPECT_NE(map.landmarks()[second].bearing, f1);
+  EXPECT_EQ(map.keyframes()[a].views[0].bearings[7], b0);
+  EXPECT_NE(map.keyframes()[a].views[1].bearings[7], b1);
 }
 
 }  // namespace
