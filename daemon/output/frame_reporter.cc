@@ -83,7 +83,7 @@ const FrameOutput& FrameReporter::report(FramePackage* package, const OutputCoun
 }
 
 FrameOutput FrameReporter::make_output(const slam::FrameResult& result) {
-  const FrameOutput output = make_frame_output(result, assumed_scale_of(result.map_id), lever_m_);
+  FrameOutput output = make_frame_output(result, assumed_scale_of(result.map_id), lever_m_);
   if (output.valid && output.result.scale == slam::ScaleState::kAssumed && assumed_map_ < 0) {
     assumed_map_ = result.map_id;
     maps_->assume_scale_of(assumed_map_);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
@@ -140,7 +141,9 @@ TEST(CurveSearch, MeasuresAsWellInARectifiedPair) {
 TEST(CurveSearch, AgreesWithOpenCvsSearchOfTheWholeRow) {
   const Scene scene(rectified_pair(), 5.0);
   const auto as_mat = [](const OwnedImage& image) {
-    return cv::Mat(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data()));
+    cv::Mat mat(image.height, image.width, CV_8U);
+    std::copy(image.pixels.begin(), image.pixels.end(), mat.data);
+    return mat;
   };
   const cv::Mat host = as_mat(scene.host_image()), target = as_mat(scene.target_image());
   constexpr int kHalf = 7, kMostDisparity = 160;

@@ -23,7 +23,7 @@ class Walls {
     int wall = 0;
   };
   [[nodiscard]] Hit look(const Eigen::Vector3d& centre, const Eigen::Vector3d& ray) const {
-    const Hit near = meet(centre, ray, kNearNormal, kNearOffset, 1);
+    Hit near = meet(centre, ray, kNearNormal, kNearOffset, 1);
     if (near.wall != 0 && near.point.x() < kEdge) return near;
     return meet(centre, ray, kFarNormal, kFarOffset, 2);
   }
