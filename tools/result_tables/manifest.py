@@ -122,13 +122,10 @@ TABLES = (
         "{bin}/farpoint report kitti03.lcm town.lcm --json")),),
         (*ESTIMATOR, "tools/report", "tools/simulate", "config/worlds/town.yaml"), timed=True, minutes=2),
     Table("instructions", "instructions", (
-        Row("rendered `town` at 320x240, 3 s", (
-            "{bin}/farpoint simulate town -o run.lcm --size 320x240 --duration 3",
+        Row("rendered `town` at 320x240, 3.5 s", (
+            "{bin}/farpoint simulate town -o run.lcm --size 320x240 --duration 3.5",
             "tools/count_instructions run.lcm")),
-        Row("KITTI 03, first 40 frames", (
-            "{bin}/farpoint import kitti {data}/kitti 03 --frames 40 -o run.lcm",
-            "tools/count_instructions run.lcm")),
-    ), (*ESTIMATOR, "tools/count_instructions"), minutes=4),
+    ), (*ESTIMATOR, "tools/count_instructions"), minutes=2),
     recorded_tests("gaps", "gaps", "test_replay", "RecordedGapsLong", minutes=2),
     recorded_tests("odometry_gaps", "odometry_gaps", "test_replay", "RecordedOdometryGapsLong", minutes=6),
     Table("searching", "searching", (
