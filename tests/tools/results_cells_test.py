@@ -104,6 +104,12 @@ class Cells(unittest.TestCase):
     def test_memory_of_runs_that_ended_before_it_was_read(self):
         self.assertEqual(len(self.table("memory", memory_rows([160.4], [191.8, 193.7]))), 2)
 
+    def test_instructions(self):
+        run = {"frames": 30, "keyframes": 7, "frame": {"pyramid": 1234.5}, "keyframe": {"find_pairs": 20000, "mapping": 9}}
+        self.assertEqual(self.table("instructions", {"a": run, "b": {**run, "keyframes": 8}}), [
+            "| frames, keyframes counted | 30, 7 | 30, 8 |", "| a frame: pyramid | 1.23 | 1.23 |",
+            "| a keyframe: find pairs | 20.00 | 20.00 |", "| a keyframe: mapping | 0.01 | 0.01 |"])
+
     def test_drives_without_end(self):
         figures_ = {"frames": 3000, "tenth_mb": 158.2, "half_mb": 161.25, "end_mb": 161.4, "early_p99_ms": 4.2,
                     "late_p99_ms": 4.31}
@@ -252,6 +258,42 @@ class LiveRuns(unittest.TestCase):
         done = self.run_script()
         self.assertEqual(done.returncode, 1)
         self.assertIn("farpointd ended with status 2: no such log", done.stderr)
+
+
+class CountInstructions(unittest.TestCase):
+    counting = script("count_instructions")
+    # Names are written once, and numbered from there on; a cost may stand behind a relative position.
+    PROFILE = """fn=(1) main
+16 400
+cfn=(2) farpoint::slam::A::b(int)
+calls=2 30
+16 1000
+fn=(2)
+30 900
+cfn=(3) farpoint::slam::N_AVX2::kernel(unsigned char const*)
+calls=7 50
++3 100
+fn=(4) other
+cfi=(5)
+cfn=(2)
+calls=1 30
+* 500
+70 9
+"""
+
+    def profile(self):
+        return self.counting.Profile(self.PROFILE.splitlines())
+
+    def test_calls_and_what_they_contain_are_added_up_over_all_callers(self):
+        profile = self.profile()
+        self.assertEqual(profile.of(profile.calls, "A::b"), 3)
+        self.assertEqual(profile.of(profile.costs, "A::b"), 1500)
+        self.assertEqual(profile.part(("A::b",), 3), 0.5)
+        self.assertEqual(profile.simd, "AVX2")
+
+    def test_a_function_that_is_gone_is_named(self):
+        with self.assertRaisesRegex(self.counting.NoCount, "A::c was never called"):
+            self.profile().part(("A::c",), 1)
 
 
 class LostRuns(unittest.TestCase):

@@ -495,7 +495,7 @@ class Manifest(unittest.TestCase):
             self.assertIn(table.kind, render.KINDS, table.name)
             self.assertIn(table.kind, making.KEEP, table.name)
             for row in table.rows:
-                self.assertRegex(row.commands[-1], r" --json$|^tools/(live_runs|lost_runs|test_figures) ", table.name)
+                self.assertRegex(row.commands[-1], r" --json$|^tools/(count_instructions|live_runs|lost_runs|test_figures) ", table.name)
 
     def test_every_suite_of_a_command_exists(self):
         sources = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("*_test.cc"))

@@ -166,6 +166,16 @@ def memory(table, result):
                                       spread([lockstep[0]["memory"]["pool_mb"]], "{:.0f} MB")]]
 
 
+def instructions(table, result):
+    """A row a part, a column a recording; millions."""
+    runs = list(result["rows"].values())
+    rows = [["frames, keyframes counted", *[f"{run['frames']}, {run['keyframes']}" for run in runs]]]
+    rows += [[f"{words[unit]}{part.replace('_', ' ')}", *[f"{run[unit][part] / 1000:.2f}" for run in runs]]
+             for words in ({"frame": "a frame: ", "keyframe": "a keyframe: "},)
+             for unit in words for part in runs[0][unit]]
+    return ["million instructions", *result["rows"]], rows
+
+
 def endless(table, result):
     rows = [endless_cells(label, values) for label, values in result["rows"].items()]
     return ["drive", "frames", "resident MB after a tenth, half, all", "tracking p99 early, late, CPU ms",

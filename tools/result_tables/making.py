@@ -34,7 +34,7 @@ def filled(command, places):
 
 
 # Scripts that run programs of the build; they draw progress on standard error.
-TAKING_BIN = ("tools/compare_modes", "tools/live_runs", "tools/lost_runs")
+TAKING_BIN = ("tools/compare_modes", "tools/count_instructions", "tools/live_runs", "tools/lost_runs")
 TALKING = (*TAKING_BIN, "tools/hil/bench")
 
 
@@ -62,6 +62,7 @@ KEEP = {
     "pairs": lambda printed: {"pairs": printed["pairs"]},
     "bench": as_printed, "work": as_printed, "gaps": as_printed, "odometry_gaps": as_printed, "searching": as_printed,
     "threads": figures.live, "memory": figures.live, "endless": as_printed, "beside_load": figures.live, "hil": as_printed,
+    "instructions": as_printed,
 }
 
 

@@ -121,6 +121,11 @@ TABLES = (
         "{bin}/farpointd --replay run.lcm --lockstep --output town.lcm",
         "{bin}/farpoint report kitti03.lcm town.lcm --json")),),
         (*ESTIMATOR, "tools/report", "tools/simulate", "config/worlds/town.yaml"), timed=True, minutes=2),
+    Table("instructions", "instructions", (
+        Row("rendered `town` at 320x240, 3.5 s", (
+            "{bin}/farpoint simulate town -o run.lcm --size 320x240 --duration 3.5",
+            "tools/count_instructions run.lcm")),
+    ), (*ESTIMATOR, "tools/count_instructions"), minutes=2),
     recorded_tests("gaps", "gaps", "test_replay", "RecordedGapsLong", minutes=2),
     recorded_tests("odometry_gaps", "odometry_gaps", "test_replay", "RecordedOdometryGapsLong", minutes=6),
     Table("searching", "searching", (

@@ -112,7 +112,7 @@ def carried(table, result):
 
 
 OF_CELLS = (cells.bench, cells.work, cells.gaps, cells.odometry_gaps, cells.searching, cells.threads, cells.beside_load,
-            cells.memory, cells.endless, cells.hil)
+            cells.memory, cells.instructions, cells.endless, cells.hil)
 KINDS = {"accuracy": accuracy, "scenes": scenes, "pairs": pairs, **{make.__name__: of_cells(make) for make in OF_CELLS}}
 
 
