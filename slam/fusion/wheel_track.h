@@ -34,7 +34,7 @@ class WheelTrack {
   explicit WheelTrack(const WheelOptions& options = {});
 
   // Takes a sample; the oldest one leaves a full ring. False where the sample is late or invalid.
-  bool add(const WheelSample& sample);
+  bool add(const WheelSample& given);
   void clear() { size_ = 0; }
 
   // The motion from one time to a later one. Samples are interpolated linearly in time. Empty where the ring

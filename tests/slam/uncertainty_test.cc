@@ -143,7 +143,7 @@ TEST_F(UncertaintyTest, ACorrectionOfTheMapIsDriftAlongItsDirection) {
 TEST_F(UncertaintyTest, TheDriftOfASecondForgetsWhatIsOlder) {
   uncertainty.advance(step(0, 1), errors(0.01, 0.0));
   for (int i = 1; i <= 100; ++i)
-    uncertainty.advance(step(0, static_cast<std::uint64_t>(i + 1)), errors(0.01, 0.02));
+    uncertainty.advance(step(0, static_cast<std::uint64_t>(i) + 1), errors(0.01, 0.02));
   OdometryStep s = step(0, 200);
   for (int i = 1; i <= 60; ++i) {
     s.utime = 100'000 * i;
