@@ -7,13 +7,6 @@
 #include <utility>
 
 namespace farpoint::drivers {
-wheels_t wheels_with_room() {
-  constexpr std::size_t kMostWheels = 4;
-  wheels_t message{};
-  message.wheel_speed.resize(kMostWheels);
-  return message;
-}
-
 WheelReader::WheelReader(const std::string& dbc_path, const std::string& names) {
   for (WheelSignal& signal : read_wheel_signals(dbc_path, names))
     wheels_.push_back({std::move(signal), 0.0, false});

@@ -2,6 +2,7 @@
 // Reads wheel speeds from CAN frames, by message and signal of a DBC file.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,7 +13,12 @@
 namespace farpoint::drivers {
 
 // A message with room for the wheels of any vehicle, so that no measurement uses the heap.
-[[nodiscard]] wheels_t wheels_with_room();
+[[nodiscard]] inline wheels_t wheels_with_room() {
+  constexpr std::size_t kMostWheels = 4;
+  wheels_t message{};
+  message.wheel_speed.resize(kMostWheels);
+  return message;
+}
 
 class WheelReader {
  public:
