@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/output/messages.h"
 
-#include "daemon/output/sound_frames.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "daemon/config/calibration_message.h"
+#include "daemon/output/sound_frames.h"
 
 namespace farpoint::daemon {
 namespace {
