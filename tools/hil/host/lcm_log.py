@@ -14,8 +14,9 @@ IMAGE = struct.Struct(">qqiifiiiii")
 CAMERA = struct.Struct(">ii4d5d3d4ddd")
 
 # status_t behind its fingerprint, as far as it is read here: before and behind its two strings of the camera.
-STATUS_HEAD, STATUS_REST = struct.Struct(">qbbdbii"), struct.Struct(">did24qb")
-STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "quality", "map_id", "reset_counter",
+STATUS_HEAD, STATUS_REST = struct.Struct(">qbbdbbbii"), struct.Struct(">did24qb")
+STATUS_NAMES = ("utime", "state", "scale_state", "assumed_scale", "metre_source", "wheels", "quality", "map_id",
+                "reset_counter",
                 "camera_rate_hz", "camera_exposure_us", "camera_gain",
                 "frames_received", "frames_tracked", "frames_valid", "frames_dropped", "keyframes_dropped",
                 "deadlines_missed",
