@@ -37,7 +37,7 @@ class RecordedReasons : public testing::Test {
   // The recording as a log, imported once a test program.
   static std::string recording(const std::string& arguments) {
     static const Scratch folder;
-    const std::string log = folder.path(std::to_string(std::hash<std::string>()(arguments)) + ".lcm");
+    std::string log = folder.path(std::to_string(std::hash<std::string>()(arguments)) + ".lcm");
     if (!fs::exists(log)) {
       EXPECT_TRUE(import_recording(arguments, log));
     }
@@ -286,7 +286,7 @@ TEST_F(RecordedReasons, ABusThatFillsTheImage) {
                if (number == kFrom - 10) bus = image->pixels;
                if (number < kFrom) return;
                const auto width = static_cast<std::size_t>(image->width_px);
-               const auto moved = static_cast<std::size_t>(15 * (number - kFrom));
+               const auto moved = 15 * static_cast<std::size_t>(number - kFrom);
                for (std::size_t y = 40; y < static_cast<std::size_t>(image->height_px); ++y)
                  for (std::size_t x = width / 5; x < width; ++x)
                    image->pixels[y * width + x] = bus[y * width + (x + width - moved % width) % width];

@@ -65,7 +65,7 @@ class WheelsOfTruth {
   explicit WheelsOfTruth(const fs::path& poses, double frame_s) : frame_s_(frame_s) {
     std::ifstream file(poses);
     for (std::vector<double> m(12); read(file, &m);) {
-      places_.push_back({m[3], m[7], m[11]});
+      places_.emplace_back(m[3], m[7], m[11]);
       yaws_.push_back(std::atan2(-m[2], m[10]));
     }
   }

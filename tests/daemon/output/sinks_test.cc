@@ -74,8 +74,10 @@ std::string can_log_of(const std::string& path, const std::vector<FrameOutput>& 
 TEST(CanReplay, ReceiverWithTheDbcGetsThePoseBackWithinAUnit) {
   const test::Scratch scratch;
   std::mt19937_64 random(1);
+  constexpr int kFrames = 200;
   std::vector<FrameOutput> frames;
-  for (int i = 0; i < 200; ++i) frames.push_back(make_frame_output(result_at(i * 100'000, &random), 1.0));
+  frames.reserve(kFrames);
+  for (int i = 0; i < kFrames; ++i) frames.push_back(make_frame_output(result_at(i * 100'000, &random), 1.0));
   const auto epochs = decode_can_log(can_log_of(scratch.path("a.candump"), frames, CanPoseFrame::kMap));
   ASSERT_EQ(epochs.size(), 5 * (frames.size() - 1) + 2);  // between the frames too, and the farewell
   for (std::size_t i = 0; i < frames.size(); ++i) {

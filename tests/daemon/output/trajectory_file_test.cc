@@ -16,12 +16,14 @@ namespace {
 namespace fs = std::filesystem;
 
 class TrajectoryFile : public testing::Test {
+ public:
+  ~TrajectoryFile() override { fs::remove_all(folder_); }
+
  protected:
   TrajectoryFile()
       : folder_(fs::temp_directory_path() / ("farpoint_trajectory_" + std::to_string(getpid()))) {
     fs::create_directories(folder_);
   }
-  ~TrajectoryFile() override { fs::remove_all(folder_); }
   [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
   [[nodiscard]] std::string content(const std::string& name) const {
     std::ifstream in(path(name));
