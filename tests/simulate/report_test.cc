@@ -121,8 +121,8 @@ class ReportOfARun : public testing::Test {
     const std::string bin = test::binary_dir() + "/bin/";
     const std::string drive = (*folder / "drive.lcm").string(), out = (*folder / "vmp.lcm").string();
     std::string script = bin + "farpoint simulate town --size 620x188 --duration 9 -o " + drive;
-    script +=
-        " && " + bin + "farpointd --replay " + drive + " --lockstep --set landmarks.mode=vmp --output " + out;
+    script += " && " + bin + "farpointd --replay " + drive +
+              " --lockstep --set landmarks.mode=vmp --set wheels.use=false --output " + out;
     made = run_shell(script);
   }
   static void TearDownTestSuite() {
