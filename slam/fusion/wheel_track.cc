@@ -142,16 +142,4 @@ std::optional<WheelMotion> WheelTrack::up_to(std::int64_t from_utime, std::int64
   return motion;
 }
 
-std::optional<WheelSample> WheelTrack::fastest(std::int64_t from_utime, std::int64_t to_utime) const {
-  if (size_ == 0 || sample(0).utime > from_utime || is_gap(sample(size_ - 1).utime, to_utime))
-    return std::nullopt;
-  WheelSample fastest{.utime = to_utime};
-  for (std::size_t i = first_after(from_utime); i < size_ && sample(i).utime <= to_utime; ++i) {
-    fastest.speed_m_per_s = std::max(fastest.speed_m_per_s, std::fabs(sample(i).speed_m_per_s));
-    fastest.yaw_rate_rad_per_s =
-        std::max(fastest.yaw_rate_rad_per_s, std::fabs(sample(i).yaw_rate_rad_per_s));
-  }
-  return fastest;
-}
-
 }  // namespace farpoint::slam

@@ -42,9 +42,6 @@ class WheelTrack {
   [[nodiscard]] std::optional<WheelMotion> between(std::int64_t from_utime, std::int64_t to_utime) const;
   // The same for the present: the newest reading holds until `to_utime`, for max_gap_s at most.
   [[nodiscard]] std::optional<WheelMotion> up_to(std::int64_t from_utime, std::int64_t to_utime) const;
-  // Largest speed and yaw rate of the readings from a time on, by magnitude. Empty where the ring does not
-  // reach back so far, or its newest reading is more than max_gap_s older than `to_utime`.
-  [[nodiscard]] std::optional<WheelSample> fastest(std::int64_t from_utime, std::int64_t to_utime) const;
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const WheelCounts& counts() const { return counts_; }

@@ -84,7 +84,9 @@ class Mapper {
   bool optimise(KeyframeHandle centre, int iterations);
   void judge_motion(KeyframeHandle newest);
   // The unit is the metre by the cameras' own baseline.
-  [[nodiscard]] bool metric_by_rig() const { return rig_calibrator_.has_value() && settling_.metric(); }
+  [[nodiscard]] bool metric_by_rig() const {
+    return rig_calibrator_.has_value() && settling_.judgement().metre() == MetreSource::kCameras;
+  }
   void refine_calibration();
   void refine_rig();
   void forget(KeyframeHandle newest);

@@ -38,8 +38,6 @@ class Settling {
   // Of the further cameras' sigmas.
   [[nodiscard]] double further_sigma_factor() const { return judgement_.further_sigma_factor; }
   [[nodiscard]] const MapJudgement& judgement() const { return judgement_; }
-  // Whether map units are metres.
-  [[nodiscard]] bool metric() const { return judgement_.metric; }
   // Of the last adjustment of this map; zeros before the first.
   [[nodiscard]] const Soundness& soundness() const { return soundness_; }
   // Whether the map is good enough to refine the calibration from.

@@ -39,6 +39,15 @@ TEST_F(SettlingTest, SettlesAfterThreeSteadyAdjustmentsInARow) {
   EXPECT_TRUE(settled());
 }
 
+TEST_F(SettlingTest, TheMetreOfAnotherSensorIsNotTheCameras) {
+  EXPECT_EQ(settling.judgement().metre(), MetreSource::kNone);
+  settling.note_motion({.unit_sigma = 0.01, .metres_per_unit = 2.0});
+  EXPECT_EQ(settling.judgement().metre(), MetreSource::kWheels);
+  settling.start_map();
+  settling.start_metric_map();
+  EXPECT_EQ(settling.judgement().metre(), MetreSource::kCameras);
+}
+
 TEST_F(SettlingTest, MovedUnitStartsTheRunAgain) {
   for (const double moved : {kMoved, 1.0 / kMoved}) {
     settling.start_map();
